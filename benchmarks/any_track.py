@@ -21,27 +21,27 @@ from typing import Any
 
 from common import RESULTS, arguments, table, write
 
-from e2efly.device import prepare, wide_vectors
+from e2efly.simulation.device import prepare, wide_vectors
 
 prepare("cpu")
 
 import jax  # noqa: E402
 import numpy as np  # noqa: E402
 
-from e2efly import presets  # noqa: E402
 from e2efly.courses.gates import Tracks  # noqa: E402
 from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, OPENING, random_tracks  # noqa: E402
 from e2efly.courses.tracks import RaceTrack, track_names  # noqa: E402
-from e2efly.env import UNSEEN, Env, random_key  # noqa: E402
-from e2efly.episodes import Act, Episodes, run_episodes, run_stepwise, wilson  # noqa: E402
-from e2efly.evaluation import act_of, candidate, episode_steps, evaluate  # noqa: E402
-from e2efly.learn.judge import judge, score  # noqa: E402
-from e2efly.learn.networks import Actor, Weights  # noqa: E402
-from e2efly.learn.programs import Programs, acting  # noqa: E402
-from e2efly.learn.runner import policy_of  # noqa: E402
-from e2efly.learn.setup import Setup  # noqa: E402
-from e2efly.learn.warm_start import started_from  # noqa: E402
-from e2efly.zoo import policy_file  # noqa: E402
+from e2efly.environment import UNSEEN, Env, random_key  # noqa: E402
+from e2efly.environment.episodes import Act, Episodes, run_episodes, run_stepwise, wilson  # noqa: E402
+from e2efly.learning.judge import judge, score  # noqa: E402
+from e2efly.learning.networks import Actor, Weights  # noqa: E402
+from e2efly.learning.programs import Programs, acting  # noqa: E402
+from e2efly.learning.runner import policy_of  # noqa: E402
+from e2efly.learning.setup import Setup  # noqa: E402
+from e2efly.learning.warm_start import started_from  # noqa: E402
+from e2efly.policy.zoo import policy_file  # noqa: E402
+from e2efly.runs import presets  # noqa: E402
+from e2efly.validation.evaluation import act_of, candidate, episode_steps, evaluate  # noqa: E402
 
 STARTS = 100
 """Of a track, where times are compared."""

@@ -14,9 +14,9 @@ import numpy as np
 from common import arguments, table, with_earlier, write
 
 import e2efly
-from e2efly.evaluation import Evaluation
+from e2efly.policy.zoo import FOLDER
+from e2efly.validation.evaluation import Evaluation
 from e2efly.vehicles import vehicle_names
-from e2efly.zoo import FOLDER
 
 DELAYS = (0.0, 0.03, 0.06, 0.09, 0.12)
 """s."""

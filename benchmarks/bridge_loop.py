@@ -26,15 +26,15 @@ from typing import Any
 import numpy as np
 from common import arguments, table, write
 from fault_table import hover_policy
-from tests.deploy.foxglove_client import FoxgloveClient
 from tests.faults.process_faults import bridge_of
+from tests.flight.foxglove_client import FoxgloveClient
 
-from e2efly.deploy.flight_loop import LOOP_PRIORITY
-from e2efly.deploy.log.channels import CHANNELS
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.log.outlet import SCRIPT
-from e2efly.deploy.settings import FlightSettings
-from e2efly.validation.room import Program, Room, take_off
+from e2efly.flight.flight_loop import LOOP_PRIORITY
+from e2efly.flight.outlet import SCRIPT
+from e2efly.flight.settings import FlightSettings
+from e2efly.logs.channels import CHANNELS
+from e2efly.logs.flight_log import read_log
+from e2efly.validation.processes import Program, Room, take_off
 
 CASES = ("alone", "live", "stalled")
 TARGET = (0.0, 0.0, 2.0)

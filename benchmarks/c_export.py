@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from common import arguments, table, write
 
-from e2efly.c_policy.exact import Exact
-from e2efly.c_policy.header import Precision, Sizes
-from e2efly.c_policy.write import write_c
-from e2efly.deploy.flight_loop import POLICY_PRIORITY
-from e2efly.deploy.policy.draws import random_images, random_observations
-from e2efly.deploy.policy.loader import Policy, load_policy
-from e2efly.zoo import contents, policy_file
+from e2efly.flight.flight_loop import POLICY_PRIORITY
+from e2efly.policy.c_export.exact import Exact
+from e2efly.policy.c_export.header import Precision, Sizes
+from e2efly.policy.c_export.write import write_c
+from e2efly.policy.loader import Policy, load_policy
+from e2efly.policy.random_inputs import random_images, random_observations
+from e2efly.policy.zoo import contents, policy_file
 
 STEPS, ROUNDS = 200, 100
 """Inputs by chance, and how often they are gone through for the time."""

@@ -22,7 +22,7 @@ from typing import Any
 
 from common import arguments, measured, median, training
 
-from e2efly.config.vehicle import FILE, RANDOM
+from e2efly.config.env import FILE, RANDOM
 
 PARTS = ("imports", "tracing", "compiling", "learning", "evaluating", "report", "export", "plots", "end")
 """What a training does, one after the other; learning and evaluating take turns."""
@@ -30,7 +30,7 @@ PARTS = ("imports", "tracing", "compiling", "learning", "evaluating", "report", 
 
 def watched(arguments: list[str]) -> dict[str, float]:
     """Run a training in this process, the time of its parts taken by functions put around them."""
-    from e2efly.learn.clock import since_process_start
+    from e2efly.learning.usage import since_process_start
 
     seconds = dict.fromkeys(PARTS, 0.0)
 
@@ -45,16 +45,16 @@ def watched(arguments: list[str]) -> dict[str, float]:
 
         setattr(module, name, staticmethod(timed) if isinstance(module, type) else timed)
 
-    import e2efly.learn.runner as runner
-    from e2efly.cli import run
-    from e2efly.device import prepare
+    import e2efly.learning.runner as runner
+    from e2efly.commands.cli import run
+    from e2efly.simulation.device import prepare
 
     with suppress(ValueError):
         prepare("cpu")
     import jax
 
-    from e2efly.learn import export
-    from e2efly.view import evaluation
+    from e2efly.learning import onnx_export
+    from e2efly.viewing import evaluation_plots
 
     def traced(event: str, duration: float, **_: Any) -> None:
         if event in ("/jax/core/compile/jaxpr_trace_duration", "/jax/core/compile/jaxpr_to_mlir_module_duration"):
@@ -74,8 +74,8 @@ def watched(arguments: list[str]) -> dict[str, float]:
         return out
 
     runner.Programs.compile = staticmethod(compile_all)  # type: ignore[method-assign]
-    around(export, "export_policy", "export")
-    around(evaluation, "plot_run", "plots")
+    around(onnx_export, "export_policy", "export")
+    around(evaluation_plots, "plot_run", "plots")
     around(runner, "_finish", "report", ("export",))
     judge = runner.judge
 
@@ -105,7 +105,7 @@ def once(task: str, seed: int, steps: int, cache: Path) -> dict[str, Any]:
     """One command in a process of its own: seconds of each part; `end` is what its user waits besides. With the success
     of the policy with each kind of vehicles.
     """
-    from e2efly.learn.judge import rates
+    from e2efly.learning.judge import rates
 
     with tempfile.TemporaryDirectory() as folder:
         told, out = Path(folder) / "parts.json", Path(folder) / "run"

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from common import arguments, table, write
-from tests.deploy.command_streams import Loopback
 from tests.faults.commanders import FAULTS, HEIGHT, HOME, TIMEOUT, Field, at
+from tests.flight.command_streams import Loopback
 
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.validation import firmware
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -139,7 +139,7 @@ def main() -> None:
     landed = 0
     for seed in range(args.flights):
         with tempfile.TemporaryDirectory() as folder, Loopback() as link:
-            rig = Rig(firmware.chosen(), Path(folder), load_vehicle(args.vehicle), latency=0.03, seed=seed)
+            rig = Rig(firmware_program.chosen(), Path(folder), load_vehicle(args.vehicle), latency=0.03, seed=seed)
             with rig:
                 rig.sleep(0.5)
                 field = Field(rig, link)

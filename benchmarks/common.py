@@ -15,12 +15,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from e2efly.commands.terminal import markdown
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
-from e2efly.device import processor
-from e2efly.learn.rundir import fingerprint
-from e2efly.storage import write_json
-from e2efly.terminal import markdown
+from e2efly.config.storage import write_json
+from e2efly.runs.rundir import fingerprint
+from e2efly.simulation.device import processor
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the fault laboratory is the tests'
 

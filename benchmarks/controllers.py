@@ -23,14 +23,14 @@ from common import RESULTS, arguments, table, write
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.control.place import Place
-from e2efly.deploy.betaflight.link import open_link
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.pilot.hovering import HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
-from e2efly.validation import firmware
-from e2efly.validation.flight import imu_of
+from e2efly.flight.betaflight.link import open_link
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.pilot.hovering import HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.plant import Delay, RigidState
+from e2efly.validation.plant_flight import imu_of
 from e2efly.validation.rig import POSE_NOISE, Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.validation.speeds import SpeedLink
 from e2efly.vehicles import Vehicle, load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
@@ -234,7 +234,7 @@ def flights(plant: str, count: int) -> list[dict[str, Any]]:
             each = {(name, case.name): in_mujoco(name, case, vehicle, seed) for name in NAMES for case in CASES}
         else:
             with tempfile.TemporaryDirectory() as folder:
-                rig = Rig(firmware.chosen(), Path(folder), vehicle, latency=POSES, seed=seed)
+                rig = Rig(firmware_program.chosen(), Path(folder), vehicle, latency=POSES, seed=seed)
                 with rig:
                     rig.sleep(0.5)
                     each = {
@@ -254,7 +254,7 @@ def flights(plant: str, count: int) -> list[dict[str, Any]]:
 
 def under_stress(task: str, episodes: int) -> list[dict[str, Any]]:
     """Percent of success of the zoo's policy and of each controller in its place, by row of the stress."""
-    from e2efly.stress import stress
+    from e2efly.validation.stress import stress
 
     found = {}
     for name in (None, *NAMES):

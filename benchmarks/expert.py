@@ -11,10 +11,10 @@ from typing import Any
 import jax
 from common import arguments, table, write
 
-from e2efly.device import prepare
-from e2efly.env import Env, random_key
-from e2efly.episodes import UnderWay, summary
-from e2efly.presets import preset
+from e2efly.environment import Env, random_key
+from e2efly.environment.episodes import UnderWay, summary
+from e2efly.runs.presets import preset
+from e2efly.simulation.device import prepare
 
 
 def flown(speed: float, nominal: bool, episodes: int) -> dict[str, Any]:

@@ -30,10 +30,10 @@ from tests.faults.campaign import Scenario, fly
 from tests.faults.scenarios import CASES, drawn
 
 import e2efly
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.device import cores
-from e2efly.storage import read_json, write_json
-from e2efly.validation import firmware
+from e2efly.config.storage import read_json, write_json
+from e2efly.policy.loader import load_policy
+from e2efly.simulation.device import cores
+from e2efly.validation import firmware_program
 from e2efly.vehicles import load_vehicle
 
 KEPT = Path(tempfile.gettempdir()) / "e2efly-fault-campaign"
@@ -45,7 +45,7 @@ def flown(scenario: Scenario) -> dict[str, Any]:
     policy, vehicle = load_policy("hover"), load_vehicle("vis_r")
     with tempfile.TemporaryDirectory() as folder:
         try:
-            outcome = asdict(fly(scenario, policy, vehicle, firmware.chosen(), Path(folder)))
+            outcome = asdict(fly(scenario, policy, vehicle, firmware_program.chosen(), Path(folder)))
         except Exception:  # whatever it is, it is a finding, and the campaign goes on
             outcome = {"problem": traceback.format_exc()}
     known = {key: None if value != value else value for key, value in outcome.items()}  # JSON has no NaN
@@ -122,7 +122,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def state_of_package() -> str:
     """A digest of all that flies and judges: what was flown with other files is not taken for this."""
-    package, built = Path(e2efly.__file__).parent, firmware.chosen()
+    package, built = Path(e2efly.__file__).parent, firmware_program.chosen()
     folders = [file for folder in (package, Path(blocks.__file__).parent) for file in folder.rglob("*")]
     parts = sorted(file for file in folders if file.is_file() and "__pycache__" not in file.parts)
     digest = hashlib.sha256(str(built.release).encode())

@@ -24,14 +24,14 @@ from filter_firmware import through_firmware
 from filter_flights import KINDS, Seen, adversaries, drawn_fences, fly, swapped
 
 from e2efly.control import Quat
-from e2efly.deploy.filter.body import Command
-from e2efly.deploy.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.pilot.fence import fence_problem
-from e2efly.deploy.pilot.hover import controlled, rates_of
-from e2efly.deploy.settings import Fence
-from e2efly.device import compute_at_once, prepare
-from e2efly.validation.validate import validate
+from e2efly.flight.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
+from e2efly.flight.filter.forecast import Command
+from e2efly.flight.pilot.fence import fence_problem
+from e2efly.flight.pilot.hover import controlled, rates_of
+from e2efly.flight.settings import Fence
+from e2efly.policy.odometry import Odometry
+from e2efly.simulation.device import compute_at_once, prepare
+from e2efly.validation.plant_validation import validate
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.vehicle import GRAVITY
 

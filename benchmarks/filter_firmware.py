@@ -9,14 +9,14 @@ from typing import Any
 
 import common  # noqa: F401  (finds the fault laboratory)
 import numpy as np
-from tests.deploy.command_streams import Loopback
 from tests.faults.commanders import VEHICLE, Commands, Field, at
+from tests.flight.command_streams import Loopback
 
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.settings import Fence
-from e2efly.validation import firmware
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.settings import Fence
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles.vehicle import GRAVITY
 
 FENCE = Fence(low=(-2.5, -2.5, 0.4), high=(2.5, 2.5, 3.5), speed=5.0, tilt=1.2)
@@ -50,7 +50,7 @@ def through_firmware(count: int) -> dict[str, Any]:
         seed += 1
         random = np.random.default_rng(seed)
         with tempfile.TemporaryDirectory(prefix="e2efly-") as folder, ExitStack() as opened:
-            rig = Rig(firmware.chosen(), Path(folder), VEHICLE, latency=LATENCY, seed=seed)
+            rig = Rig(firmware_program.chosen(), Path(folder), VEHICLE, latency=LATENCY, seed=seed)
             link = opened.enter_context(Loopback())
             opened.enter_context(rig)
             rig.sleep(0.5)

@@ -13,17 +13,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from e2efly.deploy.filter.backup import Backup
-from e2efly.deploy.filter.body import Command
-from e2efly.deploy.filter.filter import Filter, Filtered, Memory, filtered, remember, stopping_distance, watch
-from e2efly.deploy.filter.room import NAMES, Limits
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.pilot.hover import controlled, rates_of
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.deploy.policy.runtime import Imu, Runtime, act, begin
-from e2efly.deploy.settings import Fence
-from e2efly.physics import State
-from e2efly.physics.step import Physics, step
+from e2efly.flight.filter.backup import Backup
+from e2efly.flight.filter.filter import Filter, Filtered, Memory, filtered, remember, stopping_distance, watch
+from e2efly.flight.filter.forecast import Command
+from e2efly.flight.filter.margins import NAMES, Limits
+from e2efly.flight.pilot.hover import controlled, rates_of
+from e2efly.flight.settings import Fence
+from e2efly.policy.loader import load_policy
+from e2efly.policy.odometry import Odometry
+from e2efly.policy.runtime import Imu, Runtime, act, begin
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.step import Physics, step
 from e2efly.tasks.route import course_for
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY

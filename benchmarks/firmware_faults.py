@@ -16,10 +16,10 @@ from tests.faults.fault_run import strike
 from tests.faults.faults import FAULTS
 from tests.faults.stage import LATENCY_S, TARGET, Stage
 
-from e2efly.deploy.policy.loader import load_policy
+from e2efly.policy.loader import load_policy
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
-from e2efly.validation import firmware
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 
@@ -32,7 +32,7 @@ def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list
     rows: list[dict[str, Any]] = []
     while left:
         with Rig(
-            firmware.chosen(), folder / f"firmware-{seed}-{len(left)}", vehicle, latency=LATENCY_S, seed=seed
+            firmware_program.chosen(), folder / f"firmware-{seed}-{len(left)}", vehicle, latency=LATENCY_S, seed=seed
         ) as rig:
             stage = Stage(rig, policy, goal, seed + len(left))
             stage.fly(0.3)

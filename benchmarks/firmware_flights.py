@@ -13,8 +13,8 @@ from common import arguments, table, with_earlier, write
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flight_row, fly_whole
-from e2efly.device import compute_at_once, prepare
-from e2efly.evaluation import candidate
+from e2efly.simulation.device import compute_at_once, prepare
+from e2efly.validation.evaluation import candidate
 from e2efly.vehicles import load_vehicle
 
 

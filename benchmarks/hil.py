@@ -62,7 +62,7 @@ def large_scan(file: Path, least: int = 100_000) -> int:
     """Write the mesh scene terrain, its triangles cut until there are so many; how many there are."""
     import trimesh
 
-    from e2efly.scenes.meshes.load import load_mesh_scene
+    from e2efly.simulation.scenes.meshes.load import load_mesh_scene
 
     corners = load_mesh_scene("terrain").triangles.reshape(-1, 3)
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
@@ -81,12 +81,12 @@ def largest_rate(size: int, images: int, scene: str | None = None) -> tuple[floa
         scene: what is seen in place of the world of avoid, with the check of virtual collisions.
     """
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    from e2efly.device import compute_at_once, prepare
+    from e2efly.simulation.device import compute_at_once, prepare
 
     compute_at_once()
     prepare("cpu")
     from e2efly.courses.origin import Origin
-    from e2efly.evaluation import candidate
+    from e2efly.validation.evaluation import candidate
     from e2efly.validation.plant import RigidState
     from e2efly.validation.scene_files import SceneFile
     from e2efly.validation.scenery import Scenery

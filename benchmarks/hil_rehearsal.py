@@ -18,12 +18,12 @@ from typing import get_args
 
 from common import arguments, table, write
 
-from e2efly.device import prepare
-from e2efly.evaluation import candidate
-from e2efly.validation import firmware
+from e2efly.simulation.device import prepare
+from e2efly.validation import firmware_program
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.hil_lap import Lap, Spread
-from e2efly.validation.hil_rehearsal import Plan, rehearse
-from e2efly.validation.room import Victim, flags
+from e2efly.validation.processes import Victim, flags
+from e2efly.validation.rehearse_hil import Plan, rehearse
 
 WANTED, WANTED_S = 0.95, 0.015
 """Share of laps with success, and pose to image (99 %), s."""
@@ -35,7 +35,7 @@ def main() -> None:
         __doc__ or "", policies=["race_clutter"], vehicle="vis_r", laps=20, seed=0, speed=[4.0, 6.0], link_delay=None
     )
     prepare("cpu")
-    firmware.chosen()
+    firmware_program.chosen()
     laps, kills, rows, ends = dict[str, list[Lap]](), list[Lap](), list[dict[str, str]](), list[dict[str, str]]()
     with tempfile.TemporaryDirectory() as text:
         for name in args.policies:

@@ -4,9 +4,9 @@
 
 Each vehicle is drawn about the file (mass 20 %, thrust 12 %, inertia 30 % an axis, motor lag 40 %, drag 50 %, torque
 ratio 20 %, rate gain 30 %, delay 20 to 80 ms, sag up to 8 %), flown for 30 s in MuJoCo by a flight controller that
-believes in the file, and identified from the log of its sensors (`e2efly.validation.excitation`). Its mass is weighed.
+believes in the file, and identified from the log of its sensors (`e2efly.validation.plant_excitation`). Its mass is weighed.
 
-`--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.excited`),
+`--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.firmware_excitation`),
 and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
 compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
 `--first` is the seed of the first vehicle. A flight that ends before its excitation does is named in the JSON file,
@@ -22,18 +22,18 @@ from typing import Any
 import numpy as np
 from common import arguments, table, write
 
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.settings import Fence
-from e2efly.device import prepare
-from e2efly.identification.blackbox import setpoint_delay, with_blackboxes
-from e2efly.identification.checks import checked
-from e2efly.identification.flight import Found, identify
-from e2efly.identification.readers import read_flights
-from e2efly.validation import firmware
-from e2efly.validation.excitation import Sensors, fly_excitation, sensed
-from e2efly.validation.excited import fly_excited
+from e2efly.alignment.checks import checked
+from e2efly.alignment.identification import Found, identify
+from e2efly.flight.settings import Fence
+from e2efly.logs.blackbox_merge import setpoint_delay, with_blackboxes
+from e2efly.logs.readers import read_flights
+from e2efly.logs.telemetry import Telemetry
+from e2efly.simulation.device import prepare
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import rehearsal_settings
+from e2efly.validation.firmware_excitation import fly_excited
+from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles import Vehicle, load_vehicle
 
 INTERVAL = 1.645
@@ -79,7 +79,7 @@ def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Errors]:
         path = Path(folder) / "flight.mcap"
         with Telemetry(path) as log:
             flight = fly_excited(
-                firmware.chosen(), vehicle, body, settings, log=log, folder=Path(folder), blackbox=True,
+                firmware_program.chosen(), vehicle, body, settings, log=log, folder=Path(folder), blackbox=True,
                 sag=rng.uniform(0, 0.08), seed=seed,
             )  # fmt: skip
         if not flight.complete or flight.blackbox is None:

@@ -9,9 +9,9 @@ start, and HOVER must not hand over. Time is virtual: the figures do not depend 
 from common import arguments, table, write
 from tests.faults.image_faults import FAULTS, UPSIDE_DOWN, fly_with
 
-from e2efly.device import compute_at_once, prepare
-from e2efly.evaluation import candidate
-from e2efly.validation import firmware
+from e2efly.simulation.device import compute_at_once, prepare
+from e2efly.validation import firmware_program
+from e2efly.validation.evaluation import candidate
 from e2efly.vehicles import load_vehicle
 
 
@@ -20,7 +20,7 @@ def main() -> None:
     args = arguments(__doc__ or "", task="avoid", vehicle="vis_r", flights=5)
     compute_at_once()
     prepare("cpu")
-    found, vehicle, built = candidate(args.task, args.vehicle), load_vehicle(args.vehicle), firmware.chosen()
+    found, vehicle, built = candidate(args.task, args.vehicle), load_vehicle(args.vehicle), firmware_program.chosen()
     rows, flights = [], {}
     for fault in (*FAULTS, UPSIDE_DOWN):
         ended = [fly_with(built, found, vehicle, fault, seed) for seed in range(args.flights)]

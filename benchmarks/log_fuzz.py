@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 
 import common
-from tests.identification.log_samples import TOKENS, bytes_of
+from tests.logs.log_samples import TOKENS, bytes_of
 from tests.mutations import Endured, mutated
 
-from e2efly.identification.checks import checked
-from e2efly.identification.readers import read_flights
+from e2efly.alignment.checks import checked
+from e2efly.logs.readers import read_flights
 from e2efly.vehicles import load_vehicle
 
 MEMORY = 1.0

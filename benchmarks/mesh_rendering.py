@@ -17,7 +17,7 @@ from typing import Any
 
 from common import arguments, table, write
 
-from e2efly.device import cores, prepare
+from e2efly.simulation.device import cores, prepare
 
 prepare()
 
@@ -30,13 +30,13 @@ from embreex.rtcore_scene import EmbreeScene  # noqa: E402
 from rendering import rays_of  # noqa: E402
 
 from e2efly.config import CameraConfig  # noqa: E402
-from e2efly.physics.rotation import from_euler  # noqa: E402
-from e2efly.scenes import camera  # noqa: E402
-from e2efly.scenes.cast import usual_light  # noqa: E402
-from e2efly.scenes.meshes.cast import cast  # noqa: E402
-from e2efly.scenes.meshes.distance import DistanceGrid, clearance  # noqa: E402
-from e2efly.scenes.meshes.load import load_mesh_scene, mesh_scene_names  # noqa: E402
-from e2efly.scenes.meshes.scene import MeshScene, Part  # noqa: E402
+from e2efly.simulation.physics.rotation import from_euler  # noqa: E402
+from e2efly.simulation.scenes import camera  # noqa: E402
+from e2efly.simulation.scenes.cast import usual_light  # noqa: E402
+from e2efly.simulation.scenes.meshes.distance import DistanceGrid, clearance  # noqa: E402
+from e2efly.simulation.scenes.meshes.load import load_mesh_scene, mesh_scene_names  # noqa: E402
+from e2efly.simulation.scenes.meshes.mesh_cast import cast  # noqa: E402
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene, Part  # noqa: E402
 
 CELL = 0.2
 

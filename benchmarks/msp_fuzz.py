@@ -13,8 +13,8 @@ from pathlib import Path
 import common
 from tests.mutations import mutated
 
-from e2efly.deploy.betaflight.client import MESSAGES
-from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.client import MESSAGES
+from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
 
 GOLDEN = Path(__file__).parents[1] / "tests" / "data" / "msp_golden.json"
 STARTS = (b"$", b"$M>", b"$X<", b"\xff\xff")

@@ -21,7 +21,7 @@ from typing import Any
 
 from common import arguments, median, table, write
 from tests.commands.test_fly import free_port
-from tests.deploy.test_msp_client import controller, recorded
+from tests.flight.test_msp_client import controller, recorded
 
 ROOT = Path(__file__).parents[1]
 PARTS = {"e2efly-fly": "onboard", "e2efly": "."}

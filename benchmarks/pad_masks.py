@@ -14,7 +14,7 @@ from common import arguments, table, write
 from pad_network import graph, learned, weights_of
 from pad_renders import SEEN, SIDE, UNSEEN, Variety, pictures
 
-from e2efly.deploy.sight.segment.network import OWN, Network
+from e2efly.flight.sight.segment.network import OWN, Network
 
 BATCH = 256
 """Pictures that are drawn at once."""

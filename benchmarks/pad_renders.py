@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, UInt8
 
-from e2efly.sensors.image_noise import gaussian, speckle
+from e2efly.simulation.sensors.image_noise import gaussian, speckle
 
 SIDE = 64
 """Rows and columns of a picture."""

@@ -23,7 +23,7 @@ from claims.experiment import Experiment, Found, Run
 from claims.running import How, key, make, wanted
 from common import RESULTS, machine, table, today
 
-from e2efly.storage import held, write_json
+from e2efly.config.storage import held, write_json
 
 FILE = RESULTS / "paper.json"
 

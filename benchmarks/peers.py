@@ -5,8 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from e2efly.device import cores
-from e2efly.storage import cache_folder
+from e2efly.config.storage import cache_folder
+from e2efly.simulation.device import cores
 
 PEERS = {
     "Crazyflow 0.4": ("crazyflow_rate.py", {1, cores()}, ("crazyflow==0.4.0",)),

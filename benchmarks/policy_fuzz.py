@@ -16,9 +16,9 @@ import common
 import numpy as np
 from tests.policy_mutations import mutated_policy
 
-from e2efly.deploy.policy import loader, session
-from e2efly.deploy.policy.draws import random_images, random_observations
-from e2efly.zoo import FOLDER
+from e2efly.policy import loader, onnx_session
+from e2efly.policy.random_inputs import random_images, random_observations
+from e2efly.policy.zoo import FOLDER
 
 LIMIT = 1.0
 """Longest time of the processor for a file, s."""
@@ -29,8 +29,8 @@ def main() -> None:
     args = common.arguments(__doc__ or "", count=10_000, seed=0)
     rng, draws = random.Random(args.seed), np.random.default_rng(args.seed)
     files = [path.read_bytes() for path in sorted(FOLDER.glob("*/*.onnx"))]
-    session._try_out = lambda content, inputs: None
-    session.remember = lambda content: None
+    onnx_session._try_out = lambda content, inputs: None
+    onnx_session.remember = lambda content: None
     found, slowest = Counter(), 0.0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.onnx"

@@ -30,13 +30,13 @@ from common import arguments, table, write
 from peers import packages
 
 from e2efly.config import EnvConfig, RewardConfig
-from e2efly.device import prepare
-from e2efly.env import UNSEEN, Env, EnvState, random_key
-from e2efly.episodes import Act, Episodes, run_stepwise
-from e2efly.evaluation import act_of, candidate, episode_steps
-from e2efly.physics.body import hover_rotor_speed
-from e2efly.physics.rotation import from_euler, multiply, yaw
+from e2efly.environment import UNSEEN, Env, EnvState, random_key
+from e2efly.environment.episodes import Act, Episodes, run_stepwise
+from e2efly.simulation.device import prepare
+from e2efly.simulation.physics.body import hover_rotor_speed
+from e2efly.simulation.physics.rotation import from_euler, multiply, yaw
 from e2efly.tasks.hover import HoverConfig
+from e2efly.validation.evaluation import act_of, candidate, episode_steps
 from e2efly.vehicles import load_family
 from e2efly.vehicles.family import DRAWN
 from e2efly.vehicles.vehicle import GRAVITY

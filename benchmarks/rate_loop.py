@@ -17,8 +17,8 @@ import jax
 import numpy as np
 from common import arguments, table, write
 
-from e2efly.device import prepare
-from e2efly.physics import Physics, State, step
+from e2efly.simulation.device import prepare
+from e2efly.simulation.physics import Physics, State, step
 from e2efly.vehicles import load_vehicle
 
 FLIGHT_S, HELD_S, FINE_S = 2.0, 0.2, 0.00025

@@ -15,8 +15,8 @@ from common import arguments, measured, median, training
 from peers import PEERS, physics_steps
 
 from e2efly.config import EnvConfig
-from e2efly.device import prepare
-from e2efly.learn.benchmark import environment_steps, physics_substeps, training_steps
+from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
+from e2efly.simulation.device import prepare
 
 WORLDS = 1024
 OWN = ", each with parameters of its own"

@@ -21,17 +21,17 @@ import jax.numpy as jnp
 import numpy as np
 from common import arguments, table, write
 
-from e2efly.device import prepare
-from e2efly.identification.checks import checked
-from e2efly.identification.csv_file import column_map
-from e2efly.identification.flight import Found, identify
-from e2efly.identification.judge import judged
-from e2efly.identification.model import FACTOR, GYRO, NUISANCES, START, Model, simulate
-from e2efly.identification.readers import Reading, read_part
-from e2efly.identification.record import Record, Stream
-from e2efly.identification.shooting import measured_starts
-from e2efly.identification.vehicle_file import merged
-from e2efly.identification.windows import STEP, Windows, cut, join
+from e2efly.alignment.checks import checked
+from e2efly.alignment.identification import Found, identify
+from e2efly.alignment.model import FACTOR, GYRO, NUISANCES, START, Model, simulate
+from e2efly.alignment.prediction import judged
+from e2efly.alignment.shooting import measured_starts
+from e2efly.alignment.vehicle_file import merged
+from e2efly.alignment.windows import STEP, Windows, cut, join
+from e2efly.logs.csv_file import column_map
+from e2efly.logs.readers import Reading, read_part
+from e2efly.logs.recording import Record, Stream
+from e2efly.simulation.device import prepare
 from e2efly.vehicles import Vehicle, load_vehicle
 
 PARTS = ("log15:15.8-50.8", "log10:8.7-38.7")

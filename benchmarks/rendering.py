@@ -19,7 +19,7 @@ from typing import Any
 
 from common import arguments, table, write
 
-from e2efly.device import cores, prepare
+from e2efly.simulation.device import cores, prepare
 
 prepare()
 
@@ -30,13 +30,13 @@ from embreex.mesh_construction import TriangleMesh  # noqa: E402
 from embreex.rtcore_scene import EmbreeScene  # noqa: E402
 
 from e2efly.config import CameraConfig  # noqa: E402
-from e2efly.learn.devices import OWN, on_each, placed  # noqa: E402
-from e2efly.physics.rotation import from_euler, to_matrix  # noqa: E402
-from e2efly.scenes import camera  # noqa: E402
-from e2efly.scenes.cast import cast, usual_light  # noqa: E402
-from e2efly.scenes.mesh import GROUND, tessellate  # noqa: E402
-from e2efly.scenes.scene import Scene, Solids  # noqa: E402
-from e2efly.scenes.shapes import SHAPES  # noqa: E402
+from e2efly.learning.devices import OWN, on_each, placed  # noqa: E402
+from e2efly.simulation.physics.rotation import from_euler, to_matrix  # noqa: E402
+from e2efly.simulation.scenes import camera  # noqa: E402
+from e2efly.simulation.scenes.cast import cast, usual_light  # noqa: E402
+from e2efly.simulation.scenes.mesh import GROUND, tessellate  # noqa: E402
+from e2efly.simulation.scenes.scene import Scene, Solids  # noqa: E402
+from e2efly.simulation.scenes.shapes import SHAPES  # noqa: E402
 
 SEGMENTS, FINE = 32, 256
 """Around the round solids of the scenes that are timed, and of those that are compared."""

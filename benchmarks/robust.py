@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from common import arguments, table, with_earlier, write
 
-from e2efly.env.stress import ALL
-from e2efly.stress import stress
+from e2efly.environment.stress_rows import ALL
+from e2efly.validation.stress import stress
 
 TASKS = ["hover", "land", "track", "race"]
 

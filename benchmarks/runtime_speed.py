@@ -24,10 +24,10 @@ def untrained(path: Path) -> None:
     """Write a policy of the race as the presets shape it, with random weights."""
     import numpy as np
 
-    from e2efly import presets
-    from e2efly.env import Env
-    from e2efly.learn.export import contract_of, export_policy
-    from e2efly.learn.networks import Actor, Weights, init_mlp
+    from e2efly.environment import Env
+    from e2efly.learning.networks import Actor, Weights, init_mlp
+    from e2efly.learning.onnx_export import contract_of, export_policy
+    from e2efly.runs import presets
 
     config = presets.preset("race", "ppo")
     env = Env.of(config.task, config.reward, config.env)
@@ -43,9 +43,9 @@ def flight(path: str, acts: int) -> dict[str, float]:
     began = time.perf_counter()
     import numpy as np
 
-    from e2efly.deploy.odometry import Odometry
-    from e2efly.deploy.policy.loader import load_policy
-    from e2efly.deploy.policy.runtime import Runtime, act, begin
+    from e2efly.policy.loader import load_policy
+    from e2efly.policy.odometry import Odometry
+    from e2efly.policy.runtime import Runtime, act, begin
     from e2efly.tasks.route import course_for
     from e2efly.vehicles import load_vehicle
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from common import arguments, table, write
 
-from e2efly.validation.validate import validate
+from e2efly.validation.plant_validation import validate
 
 TASKS = ["hover", "land", "track", "race"]
 

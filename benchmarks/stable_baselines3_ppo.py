@@ -23,7 +23,7 @@ from common import arguments, median, table, write
 from time_to_criterion import run as ours
 
 import e2efly
-from e2efly.learn.clock import since_process_start
+from e2efly.learning.usage import since_process_start
 
 GOAL = 0.99
 KINDS = ["defaults", "our numbers"]
@@ -31,7 +31,7 @@ KINDS = ["defaults", "our numbers"]
 
 def theirs(kind: str, seed: int, limit: float) -> dict[str, float]:
     """Train in this process until the criterion: seconds, steps, success of the export; NaN if not met."""
-    from e2efly.device import prepare
+    from e2efly.simulation.device import prepare
 
     prepare("cpu")
     import numpy as np

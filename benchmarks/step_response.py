@@ -3,7 +3,7 @@
     python benchmarks/step_response.py [--vehicle vis_r] [--log steps.csv]
 
 The paper's figure of the step-response alignment, with the firmware in the place of the vehicle: it flies over the
-rigid body of the vehicle's file (`e2efly.validation.steps`), `e2efly.identification.align` fits delay and rate loop to
+rigid body of the vehicle's file (`e2efly.validation.steps`), `e2efly.alignment.alignment` fits delay and rate loop to
 the log, and docs/step_response.png shows the mean of four steps of each command. `--log` keeps the flight as CSV.
 The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps.
 """
@@ -16,24 +16,24 @@ import numpy as np
 from common import arguments, table, write
 from PIL import Image
 
+from e2efly.alignment.alignment import LEAD_S, Alignment, align
+from e2efly.alignment.checks import checked
+from e2efly.alignment.replay import SIGNALS, stretches
 from e2efly.commands.align import pose_delay_of
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.device import prepare
-from e2efly.identification.align import LEAD_S, Alignment, align
-from e2efly.identification.checks import checked
-from e2efly.identification.csv_file import write_csv
-from e2efly.identification.readers import read_flights
-from e2efly.identification.record import Record
-from e2efly.identification.replay import SIGNALS, stretches
-from e2efly.validation import firmware
+from e2efly.logs.csv_file import write_csv
+from e2efly.logs.readers import read_flights
+from e2efly.logs.recording import Record
+from e2efly.logs.telemetry import Telemetry
+from e2efly.policy.loader import load_policy
+from e2efly.policy.zoo import policy_file
+from e2efly.simulation.device import prepare
+from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
 from e2efly.validation.steps import HOLD_S, Step, fly_steps
 from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.view.alignment import AFTER, ASKED, BEFORE, MEASURED, both
-from e2efly.view.style import figure
-from e2efly.zoo import policy_file
+from e2efly.viewing.alignment import AFTER, ASKED, BEFORE, MEASURED, both
+from e2efly.viewing.style import figure
 
 PICTURE = Path(__file__).parents[1] / "docs" / "step_response.png"
 NAMES = ("thrust", "roll rate", "pitch rate", "yaw rate")
@@ -67,7 +67,7 @@ def race(name: str) -> dict[str, Any]:
     vehicle = load_vehicle(name)
     with tempfile.TemporaryDirectory() as folder:
         with Telemetry(Path(folder) / "race.mcap", queue_size=200_000) as log:
-            flown = rehearse(firmware.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
+            flown = rehearse(firmware_program.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
         read = read_flights(Path(folder) / "race.mcap")
         records = checked(read, vehicle)
         pose_delay, _, _ = pose_delay_of(None, records)
@@ -96,7 +96,7 @@ def main() -> None:
     options = arguments(__doc__ or "", vehicle="vis_r", log="")
     prepare("cpu")
     vehicle = load_vehicle(options.vehicle)
-    with tempfile.TemporaryDirectory() as folder, Rig(firmware.chosen(), Path(folder), vehicle) as rig:
+    with tempfile.TemporaryDirectory() as folder, Rig(firmware_program.chosen(), Path(folder), vehicle) as rig:
         record, steps = fly_steps(rig)
     if options.log:
         write_csv(record, Path(options.log))

@@ -12,15 +12,15 @@ import dataclasses
 
 from common import arguments, table, write
 
-from e2efly.device import prepare
+from e2efly.simulation.device import prepare
 
 prepare("cpu")
 
 import numpy as np  # noqa: E402
 
-from e2efly import presets  # noqa: E402
-from e2efly.env import Env, random_key  # noqa: E402
-from e2efly.physics.rotation import rotate  # noqa: E402
+from e2efly.environment import Env, random_key  # noqa: E402
+from e2efly.runs import presets  # noqa: E402
+from e2efly.simulation.physics.rotation import rotate  # noqa: E402
 from e2efly.vehicles import load_vehicle  # noqa: E402
 from e2efly.vehicles.vehicle import GRAVITY  # noqa: E402
 

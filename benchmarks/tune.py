@@ -22,10 +22,10 @@ import numpy as np
 from common import arguments, table, write
 
 import e2efly
-from e2efly.identification.csv_file import write_csv
-from e2efly.identification.estimate import Estimate
-from e2efly.identification.vehicle_file import write_vehicle
-from e2efly.validation.excitation import Sensors, fly_excitation, sensed
+from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.vehicle_file import write_vehicle
+from e2efly.logs.csv_file import write_csv
+from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles import Vehicle, load_vehicle
 

@@ -16,10 +16,10 @@ from typing import Any
 
 from common import arguments, table, with_earlier, write
 
-from e2efly.env.stress import ALL
-from e2efly.episodes import summary
-from e2efly.learn.rundir import RunDirectory
-from e2efly.stress import stress
+from e2efly.environment.episodes import summary
+from e2efly.environment.stress_rows import ALL
+from e2efly.runs.rundir import RunDirectory
+from e2efly.validation.stress import stress
 
 CASES = ["land_visual", "avoid", "race_clutter", "race_clutter:vis_h"]
 NOISE = "noise of a D435i"

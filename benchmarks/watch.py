@@ -57,14 +57,14 @@ def first_picture(task: str) -> float:
 
 def frames(task: str, count: int, seconds: float, looks: bool) -> float:
     """Frames of so many vehicles per second, with or without a browser that looks."""
-    from e2efly.device import prepare
+    from e2efly.simulation.device import prepare
 
     prepare("cpu")
-    from e2efly.evaluation import act_of, candidate
-    from e2efly.watch.loop import run
-    from e2efly.watch.panels import Panel, hands_on
-    from e2efly.watch.simulation import Simulation
-    from e2efly.watch.viewer import Viewer, serve
+    from e2efly.validation.evaluation import act_of, candidate
+    from e2efly.viewing.watch.loop import run
+    from e2efly.viewing.watch.panels import Panel, hands_on
+    from e2efly.viewing.watch.simulation import Simulation
+    from e2efly.viewing.watch.viewer import Viewer, serve
 
     found = candidate(task)
     suite = next(iter(found.task.criteria().values()))

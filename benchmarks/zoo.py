@@ -39,19 +39,19 @@ import numpy as np
 import onnx
 from common import arguments, table
 
-from e2efly import presets
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.deploy.policy.onnx_file import is_sealed
-from e2efly.deploy.sight.samples import COUNT, packed, samples_file
-from e2efly.env.stress import ALL
-from e2efly.evaluation import candidate
-from e2efly.learn.export import write_policy
-from e2efly.learn.judge import worst_success
-from e2efly.learn.rundir import RunDirectory, to_json
-from e2efly.storage import write_json
+from e2efly.config.storage import write_json
+from e2efly.environment.stress_rows import ALL
+from e2efly.flight.sight.samples import COUNT, packed, samples_file
+from e2efly.learning.judge import worst_success
+from e2efly.learning.onnx_export import write_policy
+from e2efly.policy.loader import load_policy
+from e2efly.policy.onnx_file import is_sealed
+from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
+from e2efly.runs import presets
+from e2efly.runs.rundir import RunDirectory, to_json
 from e2efly.tasks import TASKS
+from e2efly.validation.evaluation import candidate
 from e2efly.vehicles import family_names, vehicle_names
-from e2efly.zoo import FOLDER, USUAL, config_file, contents, curve_file
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""

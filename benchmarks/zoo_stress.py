@@ -17,11 +17,11 @@ from typing import Any
 from common import arguments, table, write
 
 import e2efly
-from e2efly.env.stress import ROWS, rows_for
-from e2efly.stress import stress
+from e2efly.environment.stress_rows import ROWS, rows_for
+from e2efly.policy.zoo import contents
 from e2efly.tasks import TASKS
+from e2efly.validation.stress import stress
 from e2efly.vehicles import vehicle_names
-from e2efly.zoo import contents
 
 
 def _by_criterion(columns: Iterable[str], called: str, of: Callable[[Any], dict[str, float]], scale: float) -> Any:

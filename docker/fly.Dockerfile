@@ -13,5 +13,5 @@ RUN useradd --create-home --groups dialout,video pilot && mkdir -p /data/flights
 USER pilot
 WORKDIR /data
 # a container ends with its first process: this one waits for the watchdog, which lands the vehicle if the bridge dies
-ENTRYPOINT ["python", "-m", "e2efly.deploy.process.first", "e2efly"]
+ENTRYPOINT ["python", "-m", "e2efly.flight.scripts.first", "e2efly"]
 CMD ["fly", "--help"]

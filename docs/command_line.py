@@ -5,7 +5,7 @@ import io
 import os
 from pathlib import Path
 
-from e2efly import cli
+from e2efly.commands import cli
 
 PAGE = Path(__file__).parent / "reference" / "command-line.md"
 ABOUT = """# Command line

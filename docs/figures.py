@@ -11,10 +11,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from e2efly.commands.terminal import markdown
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
-from e2efly.learn.rundir import fingerprint
-from e2efly.terminal import markdown
+from e2efly.runs.rundir import fingerprint
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
@@ -236,11 +236,11 @@ def noise() -> None:
     from PIL import Image
 
     from e2efly.config import ImuConfig
-    from e2efly.env import random_key
-    from e2efly.scenes.camera import PRESETS
-    from e2efly.view.images import look_around, sized
-    from e2efly.view.noise import plot_depth_noise, plot_image_noise, plot_imu
-    from e2efly.view.places import find_place
+    from e2efly.environment import random_key
+    from e2efly.simulation.scenes.camera import PRESETS
+    from e2efly.viewing.image_plots import look_around, sized
+    from e2efly.viewing.noise_plots import plot_depth_noise, plot_image_noise, plot_imu
+    from e2efly.viewing.places import find_place
 
     place, camera = find_place("corridor", random_key(0)), sized(PRESETS["d435i"], 320, None, None)
     sight = look_around(camera, place.scene, 0.0, np.array([0.5, 0.0, 1.5]), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -259,7 +259,7 @@ def families() -> None:
     from PIL import Image
 
     from e2efly.vehicles import load_family
-    from e2efly.view.family import plot_family
+    from e2efly.viewing.family_plot import plot_family
 
     family, path = load_family("any"), DOCS / "any_vehicle.png"
     assert family is not None
@@ -273,7 +273,7 @@ def thrown() -> None:
     """docs/thrown.png: success while learning to catch a thrown vehicle, by environment steps and by seconds."""
     import numpy as np
 
-    from e2efly.view.style import CYCLE, figure
+    from e2efly.viewing.style import CYCLE, figure
 
     path = RESULTS / "thrown.json"
     if not path.exists():
@@ -300,7 +300,7 @@ def thrown() -> None:
 
 def cold_start() -> None:
     """docs/cold_start.png: where a training spends its time, a stacked bar for each command."""
-    from e2efly.view.style import CYCLE, figure
+    from e2efly.viewing.style import CYCLE, figure
 
     rows = json.loads((RESULTS / "cold_start.json").read_text())["table"]
     heads = list(rows[0])
@@ -329,7 +329,7 @@ def any_track() -> None:
     from matplotlib.colors import Normalize
 
     from e2efly.courses.random_tracks import CANDIDATES, NUMBERS, random_tracks
-    from e2efly.view.style import GREY, PALE, SPEED, START, figure
+    from e2efly.viewing.style import GREY, PALE, SPEED, START, figure
 
     tracks = random_tracks(np.random.default_rng(7).random((15, CANDIDATES, NUMBERS), np.float32))
     notes = [

@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from e2efly.terminal import markdown
+from e2efly.commands.terminal import markdown
 
 DOCS = Path(__file__).parent
 FILE = DOCS.parent / "benchmarks" / "results" / "paper.json"
@@ -133,7 +133,7 @@ def curve(one: dict[str, Any], name: str) -> list[float]:
 
 def learning(runs: list[dict[str, Any]]) -> None:
     """docs/paper_learning.png: reward and success of every run against steps, one column per task."""
-    from e2efly.view.style import CYCLE, figure
+    from e2efly.viewing.style import CYCLE, figure
 
     tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
     notes = ["one line per run; the preset paper; dashed: PPO with the action and sparse terms of its own table"]
@@ -159,8 +159,8 @@ def learning(runs: list[dict[str, Any]]) -> None:
 
 def ablation(runs: list[dict[str, Any]]) -> None:
     """docs/paper_ablation.png: the full reward and each without one part, one panel per task, algorithm and preset."""
-    from e2efly.drawing import INK
-    from e2efly.view.style import CYCLE, figure
+    from e2efly.config.drawing import INK
+    from e2efly.viewing.style import CYCLE, figure
 
     tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
     kinds = sorted({(one["variant"], one["algo"]) for one in runs})

@@ -12,12 +12,12 @@ from typing import Any
 from e2efly.commands.train import parse
 from e2efly.config import TrainConfig
 from e2efly.config.changes import differing
-from e2efly.config.vehicle import FILE, STILL
-from e2efly.deploy.policy.loader import Policy, load_policy
-from e2efly.learn.rundir import from_json
-from e2efly.storage import read_json
+from e2efly.config.env import FILE, STILL
+from e2efly.config.storage import read_json
+from e2efly.policy.loader import Policy, load_policy
+from e2efly.policy.zoo import USUAL, config_file, contents, policy_file
+from e2efly.runs.rundir import from_json
 from e2efly.vehicles import load_family
-from e2efly.zoo import USUAL, config_file, contents, policy_file
 
 DOCS = Path(__file__).parent
 TASKS = {
@@ -43,7 +43,7 @@ WORST = 3
 INTRO = """
 # The zoo
 
-Written by `make docs` from `src/e2efly/zoo/zoo.json` and the policies beside it. These policies come with the
+Written by `make docs` from `src/e2efly/policy/zoo/zoo.json` and the policies beside it. These policies come with the
 package. Every command that takes a policy takes one by the name of its card:
 
     e2efly eval vis_r/hover

@@ -17,17 +17,17 @@ import jax
 import numpy as np
 from PIL import Image
 
-from e2efly.adapters.picture import Chase
+from e2efly.adapters.chase import Chase
 from e2efly.config import TaskConfig
-from e2efly.device import prepare
-from e2efly.env import UNSEEN, Env, random_key
-from e2efly.episodes import Act
-from e2efly.evaluation import SEED, act_of, candidate, episode_steps
-from e2efly.view.flights import Flights, fly
-from e2efly.view.space import plot_flights
-from e2efly.view.style import CYCLE, figure
-from e2efly.view.worlds import plot_flights_in_worlds
-from e2efly.zoo import USUAL, contents, curve_file, policy_file
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.episodes import Act
+from e2efly.policy.zoo import USUAL, contents, curve_file, policy_file
+from e2efly.simulation.device import prepare
+from e2efly.validation.evaluation import SEED, act_of, candidate, episode_steps
+from e2efly.viewing.flights import Flights, fly
+from e2efly.viewing.space import plot_flights
+from e2efly.viewing.style import CYCLE, figure
+from e2efly.viewing.worlds import plot_flights_in_worlds
 
 FOLDER = Path(__file__).parent / "zoo"
 EPISODES, SEEN = 12, 6

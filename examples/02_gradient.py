@@ -5,7 +5,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from e2efly.physics import Physics, State, step
+from e2efly.simulation.physics import Physics, State, step
 from e2efly.vehicles import load_vehicle
 
 vehicle = load_vehicle("vis_r")

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from e2efly.config import EnvConfig, RewardConfig
-from e2efly.env import Env, random_key
+from e2efly.environment import Env, random_key
 from e2efly.tasks.hover import HoverConfig
 
 env = Env.of(

@@ -11,7 +11,7 @@ import numpy as np
 import e2efly
 from e2efly.config import number
 from e2efly.control.vectors import namespace
-from e2efly.goal import Course, Outcome, Shape
+from e2efly.policy.goal import Course, Outcome, Shape
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.hover.world import Hover
 from e2efly.tasks.route import Route

@@ -12,8 +12,8 @@ from jax.flatten_util import ravel_pytree
 
 import e2efly
 from e2efly.config import AlgorithmConfig, number
-from e2efly.learn.algorithm import Algorithm, TrainState, annealed, descend, episode_metrics
-from e2efly.learn.networks import Weights
+from e2efly.learning.algorithm import Algorithm, TrainState, annealed, descend, episode_metrics
+from e2efly.learning.networks import Weights
 
 
 @jax.tree_util.register_dataclass

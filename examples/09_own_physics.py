@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import e2efly
-from e2efly.deploy.policy.loader import Policy
+from e2efly.policy.loader import Policy
 from e2efly.vehicles import Vehicle
 
 LARGEST_STEP = 0.005

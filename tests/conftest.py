@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from e2efly import device
+from e2efly.simulation import device
 
 QUICK = (
     "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
@@ -43,11 +43,11 @@ settings.load_profile("suite")
 PARTS = ("ros1", "ros2", "mocap", "realsense", "sitl", "browser", "cc")
 """What may be missing on a laptop: tests in files whose names end so need it, and fail without it."""
 LONGEST = (
-    "docs/test_tutorials.py", "docs/test_notebooks.py", "test_paper.py",
-    "identification/test_flight.py", "learn/test_runner.py", "learn/test_hosts.py", "commands/test_sweep.py",
-    "test_zoo.py", "learn/test_ablation.py", "learn/test_algorithms.py", "validation/test_faults_sitl.py",
-    "validation/test_campaign_sitl.py", "test_examples.py", "adapters/test_torch.py", "scenes/test_cast.py",
-    "web/test_page_browser.py",
+    "docs/test_tutorials.py", "docs/test_notebooks.py", "learning/test_paper.py",
+    "alignment/test_identification.py", "learning/test_runner.py", "learning/test_hosts.py", "commands/test_sweep.py",
+    "policy/test_zoo.py", "learning/test_ablation.py", "learning/test_algorithms.py", "validation/test_faults_sitl.py",
+    "validation/test_campaign_sitl.py", "test_examples.py", "adapters/test_torch.py", "simulation/scenes/test_cast.py",
+    "viewing/web/test_page_browser.py",
 )  # fmt: skip
 """Files that take a minute or so, the longest first: they begin, so that of two workers neither ends long alone."""
 WITHOUT = tuple(filter(None, os.environ.get("E2EFLY_WITHOUT", "").split(",")))

@@ -4,9 +4,9 @@ import json
 import random
 from typing import Any
 
-from e2efly.deploy.policy.contract import METADATA_KEY
-from e2efly.deploy.policy.onnx_file import METADATA, SCHEMA, read, sealed, write
-from e2efly.deploy.policy.onnx_graph import OPERATORS
+from e2efly.policy.contract import METADATA_KEY
+from e2efly.policy.onnx_file import METADATA, SCHEMA, read, sealed, write
+from e2efly.policy.onnx_graph import OPERATORS
 from tests.mutations import mutated
 
 INTEGERS = (0, 1, -1, 2, 3, 255, 65536, 2**31 - 1, 2**31, 2**40, 2**62, -(2**63), 2**63 - 1)

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import e2efly
-from e2efly.cli import run
-from e2efly.deploy.pose.registry import SOURCES
-from e2efly.deploy.pose.sources import open_source
+from e2efly.commands.cli import run
+from e2efly.flight.pose.registry import SOURCES
+from e2efly.flight.pose.sources import open_source
 from e2efly.tasks import TASKS
 from e2efly.validation.plants import PLANTS
 

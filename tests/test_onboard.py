@@ -16,11 +16,11 @@ from typing import Any
 
 import pytest
 
-from e2efly.cli import WHOLE
+from e2efly.commands.cli import WHOLE
 from e2efly.commands.fly import parse
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.service import PERIOD_S
-from tests.deploy.test_msp_client import controller, recorded
+from e2efly.flight.service import PERIOD_S
+from e2efly.logs.flight_log import read_log
+from tests.flight.test_msp_client import controller, recorded
 from tests.waiting import free_port
 
 ROOT = Path(__file__).parents[1]
@@ -89,11 +89,11 @@ def test_the_wheel_has_the_bridge_and_the_zoo_and_not_the_page(tmp_path: Path) -
     (wheel,) = tmp_path.glob("e2efly_fly-*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     for name in (
-        "deploy/bridge.py",
+        "flight/bridge.py",
         "zoo/vis_r/hover.onnx",
         "vehicles/vis_r.toml",
         "py.typed",
-        "deploy/process/speech.py",
+        "flight/scripts/speech.py",
     ):
         assert f"e2efly/{name}" in names
     assert not [name for name in names if name.startswith("e2efly/web")]
@@ -102,7 +102,7 @@ def test_the_wheel_has_the_bridge_and_the_zoo_and_not_the_page(tmp_path: Path) -
 
 def test_it_looks_at_a_controller_without_jax(slim: Path, tmp_path: Path) -> None:
     """With `--check`, for a policy of the zoo."""
-    code = "import sys; from e2efly.cli import run; s = run(sys.argv[1:]); print('modules', *sys.modules); sys.exit(s)"
+    code = "import sys; from e2efly.commands.cli import run; s = run(sys.argv[1:]); print('modules', *sys.modules); sys.exit(s)"
     with controller(recorded) as client:
         command = [slim, "-c", code, "fly", "hover", "--check", "--link", client.link.name]  # type: ignore[attr-defined]
         done = subprocess.run(
@@ -111,7 +111,7 @@ def test_it_looks_at_a_controller_without_jax(slim: Path, tmp_path: Path) -> Non
     assert done.returncode == 1, done.stderr  # nothing is set up on the recorded one
     assert "msp_override_channels_mask" in done.stdout
     loaded = done.stdout.rsplit("modules", 1)[1].split()
-    assert "e2efly.deploy.bridge" in loaded
+    assert "e2efly.flight.bridge" in loaded
     assert not [name for name in loaded if name.split(".")[0] in WHOLE]
 
 

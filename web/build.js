@@ -5,7 +5,7 @@ import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
 // index.html and page.css need no building: they stand there
-const OUT = "../src/e2efly/web/assets";
+const OUT = "../src/e2efly/viewing/web/assets";
 const RUNTIME = "node_modules/onnxruntime-web/dist/ort-wasm-simd-threaded.wasm";
 
 /** Hash of all that the page is built from, by which a test knows that it was built from what is here. */

@@ -146,7 +146,7 @@ def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda
 
 def taken(out: Path) -> float:
     """Environment steps that a training has taken so far."""
-    from e2efly.learn.rundir import RunDirectory
+    from e2efly.runs.rundir import RunDirectory
 
     rows = RunDirectory(out).rows()
     return rows[-1]["steps"] if rows else 0.0
@@ -154,7 +154,7 @@ def taken(out: Path) -> float:
 
 def figures(out: Path) -> dict[str, Any]:
     """What a run directory says: steps, seconds, curves, when levels were reached, how the best policy flew."""
-    from e2efly.learn.rundir import RunDirectory
+    from e2efly.runs.rundir import RunDirectory
 
     run = RunDirectory(out)
     summary, rows = run.read_json("summary.json"), run.rows()
@@ -198,7 +198,7 @@ def converged(points: Sequence[Mapping[str, float]]) -> dict[str, float]:
 def flights(policy: Path | str, asked: Mapping[str, Flight], how: How) -> dict[str, Any]:
     """How a policy flew in each of the flights, by criterion, or by what its episodes drew."""
     from e2efly import evaluate
-    from e2efly.episodes import summary
+    from e2efly.environment.episodes import summary
 
     flown = {}
     for name, flight in list(asked.items())[: 1 if how.short else None]:

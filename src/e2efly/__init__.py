@@ -12,17 +12,17 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from e2efly.adapters.export import export
+    from e2efly.adapters.export_policy import export
     from e2efly.api import list_tasks, make_env, preset, train
     from e2efly.config.algorithms import register as register_algorithm
-    from e2efly.deploy.policy.loader import load_policy
-    from e2efly.deploy.pose.registry import register as register_pose_source
-    from e2efly.evaluation import evaluate
-    from e2efly.rewards import register as register_reward
+    from e2efly.flight.pose.registry import register as register_pose_source
+    from e2efly.policy.loader import load_policy
+    from e2efly.simulation.rewards import register as register_reward
     from e2efly.tasks import register as register_task
+    from e2efly.validation.evaluation import evaluate
     from e2efly.validation.plant import Plant, RigidState
+    from e2efly.validation.plant_validation import validate
     from e2efly.validation.plants import register as register_plant
-    from e2efly.validation.validate import validate
     from e2efly.vehicles import load_vehicle
 
 __all__ = [
@@ -63,14 +63,14 @@ if _too_late:  # ONNX Runtime reads its variable once, while it is imported
     )
 
 _FACE = {
-    "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant", "evaluate": "e2efly.evaluation",
-    "export": "e2efly.adapters.export",
-    "list_tasks": "e2efly.api", "load_policy": "e2efly.deploy.policy.loader", "load_vehicle": "e2efly.vehicles",
+    "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant", "evaluate": "e2efly.validation.evaluation",
+    "export": "e2efly.adapters.export_policy",
+    "list_tasks": "e2efly.api", "load_policy": "e2efly.policy.loader", "load_vehicle": "e2efly.vehicles",
     "make_env": "e2efly.api", "preset": "e2efly.api", "register_algorithm": "e2efly.config.algorithms:register",
     "register_plant": "e2efly.validation.plants:register",
-    "register_reward": "e2efly.rewards:register", "register_task": "e2efly.tasks:register", "train": "e2efly.api",
-    "validate": "e2efly.validation.validate",
-    "register_pose_source": "e2efly.deploy.pose.registry:register",
+    "register_reward": "e2efly.simulation.rewards:register", "register_task": "e2efly.tasks:register", "train": "e2efly.api",
+    "validate": "e2efly.validation.plant_validation",
+    "register_pose_source": "e2efly.flight.pose.registry:register",
 }  # fmt: skip
 
 

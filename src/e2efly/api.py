@@ -5,9 +5,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from e2efly import presets
 from e2efly.config import ALGORITHMS, AlgorithmConfig, EnvConfig, NetworkConfig, RewardConfig, TaskConfig, TrainConfig
-from e2efly.device import prepare
+from e2efly.runs import presets
+from e2efly.simulation.device import prepare
 from e2efly.tasks import TASKS
 
 TaskLike = str | type[TaskConfig] | TaskConfig
@@ -103,10 +103,10 @@ def train(
         config = dataclasses.replace(config, start_from=os.fspath(start_from))
     config = presets.begun(config)
     prepare(device)
-    from e2efly.learn.programs import traced_folder
-    from e2efly.learn.rundir import run_folder
-    from e2efly.learn.runner import train as run
-    from e2efly.terminal import Terminal, TerminalProgress
+    from e2efly.commands.terminal import Terminal, TerminalProgress
+    from e2efly.learning.programs import traced_folder
+    from e2efly.learning.runner import train as run
+    from e2efly.runs.rundir import run_folder
 
     folder = run_folder(config) if out is None else Path(out)
     title = f"{config.task.name} by {config.algo.name}"
@@ -119,7 +119,7 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
 
     Args:
         task: the task.
-        num_envs: None returns the functional JAX environment, `e2efly.env.Env`. A number returns a Gymnasium vector
+        num_envs: None returns the functional JAX environment, `e2efly.environment.Env`. A number returns a Gymnasium vector
             environment with this many vehicles (needs the extra `gym`).
         options: fields of `EnvConfig`, such as vehicle, wind or randomize.
 
@@ -132,6 +132,6 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
         from e2efly.adapters.gym import QuadrotorVectorEnv
 
         return QuadrotorVectorEnv(config, num_envs)
-    from e2efly.env import Env
+    from e2efly.environment import Env
 
     return Env.of(config.task, config.reward, config.env)

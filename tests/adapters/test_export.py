@@ -12,12 +12,12 @@ from stable_baselines3 import A2C, PPO, SAC, TD3
 from stable_baselines3.common.vec_env import VecFrameStack, VecMonitor, VecNormalize
 
 import e2efly
-from e2efly import presets
 from e2efly.adapters.gym import QuadrotorVectorEnv
 from e2efly.adapters.stable_baselines3 import SB3VecEnv
 from e2efly.adapters.torch import TorchEnv
 from e2efly.config import NetworkConfig
-from e2efly.deploy.policy.draws import random_observations
+from e2efly.policy.random_inputs import random_observations
+from e2efly.runs import presets
 
 pytestmark = pytest.mark.usefixtures("quick")
 

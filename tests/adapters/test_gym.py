@@ -13,11 +13,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from e2efly import presets
-from e2efly.adapters import picture
+from e2efly.adapters import chase
 from e2efly.adapters.gym import QuadrotorEnv, QuadrotorVectorEnv
 from e2efly.config import TrainConfig
-from e2efly.env import Env, random_key
+from e2efly.environment import Env, random_key
+from e2efly.runs import presets
 from e2efly.tasks import TASKS
 
 
@@ -29,8 +29,8 @@ def short(seconds: float = 0.2) -> TrainConfig:
 
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of what is made from here on: a picture of full size takes a second."""
-    monkeypatch.setattr(picture, "WIDTH", 48)
-    monkeypatch.setattr(picture, "HEIGHT", 32)
+    monkeypatch.setattr(chase, "WIDTH", 48)
+    monkeypatch.setattr(chase, "HEIGHT", 32)
 
 
 def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
@@ -179,7 +179,7 @@ def test_all_of_a_batch_are_drawn_and_other_modes_are_refused(monkeypatch: pytes
     envs.reset(seed=0)
     pictures = envs.render()
     assert pictures is not None
-    assert [picture.shape for picture in pictures] == [(320, 480, 3)] * 3
+    assert [chase.shape for chase in pictures] == [(320, 480, 3)] * 3
     assert np.any(pictures[0] != pictures[1])
     small_pictures(monkeypatch)
     gates = QuadrotorVectorEnv("race_clutter", 6, render_mode="rgb_array")  # of as many gates as vehicles

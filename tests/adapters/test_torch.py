@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from e2efly import presets
 from e2efly.adapters.torch import TorchEnv
-from e2efly.env import Env, random_key
-from e2efly.learn.networks import Features
+from e2efly.environment import Env, random_key
+from e2efly.learning.networks import Features
+from e2efly.runs import presets
 
 N, STEPS = 32, 12
 

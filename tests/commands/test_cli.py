@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 import e2efly
-from e2efly.cli import COMMANDS, run
+from e2efly.commands.cli import COMMANDS, run
 from e2efly.commands.train import parse
-from e2efly.learn.judge import verdict
+from e2efly.learning.judge import verdict
 from e2efly.vehicles import vehicle_file
-from tests.learn.one_program import compile_once
+from tests.learning.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")
 
@@ -200,7 +200,7 @@ def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str
                                        ["--version"]])  # fmt: skip
 def test_help_imports_no_jax(arguments: list[str]) -> None:
     code = (
-        "import sys; from e2efly.cli import run\n"
+        "import sys; from e2efly.commands.cli import run\n"
         f"try: run({arguments!r})\nexcept SystemExit: pass\n"
         "sys.exit('jax' in sys.modules)"
     )

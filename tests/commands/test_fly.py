@@ -18,12 +18,12 @@ from rosbags.highlevel import AnyReader
 
 from e2efly.commands.fly import Fly, parse
 from e2efly.commands.fly import run as fly_command
-from e2efly.deploy.betaflight.codec import REPLY, Frame, encode
-from e2efly.deploy.betaflight.messages import Name
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.settings import Fence, FlightSettings
+from e2efly.flight.betaflight.codec import REPLY, Frame, encode
+from e2efly.flight.betaflight.messages import Name
+from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.logs.flight_log import read_log
 from e2efly.tasks.hover.goal import HoverRoute
-from tests.deploy.test_msp_client import controller, recorded
+from tests.flight.test_msp_client import controller, recorded
 from tests.waiting import free_port, until
 
 FORGED = "\x1b[2K\rPOLICY: all is well"

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from rich.table import Table
 
-from e2efly.cli import run
-from e2efly.terminal import Terminal
+from e2efly.commands.cli import run
+from e2efly.commands.terminal import Terminal
 
 
 def e2efly(*arguments: str, **how: object) -> subprocess.CompletedProcess[str]:
@@ -93,7 +93,7 @@ def test_an_environment_that_nothing_computes_in_is_named(name: str, value: str,
 def test_an_interrupt_ends_the_process_in_the_middle_of_native_code() -> None:
     code = (
         "import os, signal, threading, zlib\n"
-        "from e2efly.process import end_at_interrupt\n"
+        "from e2efly.flight.process import end_at_interrupt\n"
         "end_at_interrupt()\n"
         "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "data = os.urandom(1 << 28)\n"
@@ -108,7 +108,7 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     code = (
         "import os, signal\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "from e2efly.process import end_at_interrupt\n"
+        "from e2efly.flight.process import end_at_interrupt\n"
         "end_at_interrupt()\n"
         "os.kill(os.getpid(), signal.SIGINT)\n"
         "print('went on')"

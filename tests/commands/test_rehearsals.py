@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flights_table
+from e2efly.validation.bridge_session import Flown
 from e2efly.validation.rehearsal import Rehearsal
-from e2efly.validation.session import Flown
 
 MODES = ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
 REASONS = ("", "mission switch", "reached its height", "mission switch", "mission switch", "mission switch",

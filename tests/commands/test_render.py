@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.commands.render import Render
-from e2efly.env import random_key
-from e2efly.scenes.camera import PRESETS
-from e2efly.view import video
-from e2efly.view.images import look_around, sized
-from e2efly.view.places import find_place
-from e2efly.view.tour import Tour, attitudes, plan
+from e2efly.environment import random_key
+from e2efly.simulation.scenes.camera import PRESETS
+from e2efly.viewing import video
+from e2efly.viewing.image_plots import look_around, sized
+from e2efly.viewing.places import find_place
+from e2efly.viewing.tour import Tour, attitudes, plan
 
 SCENE = """
 [[solids]]

@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
-from e2efly.identification.csv_file import write_csv
-from e2efly.storage import held
-from e2efly.stress import stress
-from e2efly.validation.excitation import Sensors, fly_excitation, sensed
+from e2efly.commands.cli import run
+from e2efly.config.storage import held
+from e2efly.logs.csv_file import write_csv
+from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
+from e2efly.validation.stress import stress
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 
 
 @pytest.mark.whole
 def test_a_log_becomes_a_policy_for_the_vehicle_that_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("e2efly.view.style.DPI", 30)
+    monkeypatch.setattr("e2efly.viewing.style.DPI", 30)
     # every row of the stress, from one batch of starts instead of four
-    monkeypatch.setattr("e2efly.stress.stress", lambda policy, _, **flies: stress(policy, 50, **flies))
+    monkeypatch.setattr("e2efly.validation.stress.stress", lambda policy, _, **flies: stress(policy, 50, **flies))
     vehicle = load_vehicle("vis_r")
     plant = find_plant("mujoco")(vehicle)
     log, out = tmp_path / "flight.csv", tmp_path / "tuned"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
-from e2efly.physics import Physics, State
-from e2efly.physics.control import control_law
-from e2efly.physics.state import Parts
+from e2efly.simulation.physics import Physics, State
+from e2efly.simulation.physics.control import control_law
+from e2efly.simulation.physics.state import Parts
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")

@@ -15,9 +15,9 @@ from e2efly.courses.gates import Gates
 from e2efly.courses.origin import Origin
 from e2efly.courses.references import Lissajous, Polynomials, Spline, read_csv
 from e2efly.courses.tracks import load_track, track_names
-from e2efly.env import random_key
-from e2efly.scenes import course as _registered  # JAX knows gates by it  # noqa: F401
-from e2efly.tasks.references import polynomial
+from e2efly.environment import random_key
+from e2efly.simulation.scenes import course as _registered  # JAX knows gates by it  # noqa: F401
+from e2efly.tasks.track.splines import polynomial
 
 CURVES = [Lissajous.circle(2.0, 0.2 * np.pi), Lissajous.lemniscate(2.0, 3.0)]
 

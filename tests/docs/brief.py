@@ -5,10 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from e2efly import evaluation, stress
 from e2efly.config import TrainConfig
-from e2efly.learn import runner
-from e2efly.validation import starts
+from e2efly.learning import runner
+from e2efly.validation import evaluation, starts, stress
 
 STARTS = 50
 """From so many starts a policy is judged by a training, which takes 1000 otherwise."""

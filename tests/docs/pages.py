@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly import cli
+from e2efly.commands import cli
 from tests.conftest import QUICK
 from tests.docs.brief import shorten
 

@@ -15,8 +15,8 @@ from PIL import Image
 
 from e2efly.commands.train import parse
 from e2efly.config import StageConfig
-from e2efly.learn.rundir import RunDirectory
-from e2efly.zoo import FOLDER, USUAL, contents, curve_file, policy_file
+from e2efly.policy.zoo import FOLDER, USUAL, contents, curve_file, policy_file
+from e2efly.runs.rundir import RunDirectory
 from tests.docs.pages import DOCS, ROOT
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.config import ALGORITHMS
 from e2efly.tasks import TASKS
 from tests.docs.pages import DOCS, ROOT

@@ -100,9 +100,9 @@ def test_no_list_or_table_is_shown_as_text(site: Path) -> None:
 def test_the_reference_has_what_import_e2efly_offers(pages: dict[Path, Page]) -> None:
     ids = {anchor for path, page in pages.items() if path.parent.name == "reference" for anchor in page.ids}
     wanted = {
-        "e2efly.api.train", "e2efly.evaluation.evaluate", "e2efly.validation.validate.validate", "e2efly.goal.Goal",
-        "e2efly.deploy.policy.loader.load_policy", "e2efly.validation.plant.Plant", "train", "eval",
-        "e2efly.config.train.TrainConfig", "e2efly.physics.step.step",
+        "e2efly.api.train", "e2efly.validation.evaluation.evaluate", "e2efly.validation.plant_validation.validate", "e2efly.policy.goal.Goal",
+        "e2efly.policy.loader.load_policy", "e2efly.validation.plant.Plant", "train", "eval",
+        "e2efly.config.run.TrainConfig", "e2efly.simulation.physics.step.step",
     }  # fmt: skip
     assert wanted <= ids
 

@@ -9,7 +9,7 @@ import struct
 import sys
 from typing import Any
 
-from e2efly.deploy.child import SCRIPTS
+from e2efly.flight.child import SCRIPTS
 
 FRAME = struct.Struct("<d2I")
 """Before an image: its time, s, and its rows and columns; float32 values follow."""

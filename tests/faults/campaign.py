@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.policy.loader import Policy
-from e2efly.validation.firmware import Firmware
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.policy.loader import Policy
+from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.campaign_rules import IDLE, LONGEST_ARMED, ON_GROUND, Span, Violation, judge

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.commander.stream import Stream
-from e2efly.deploy.log.record import Log
-from e2efly.deploy.odometry import yaw_of
-from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.flight.commander.stream import Stream
+from e2efly.flight.log_record import Log
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.policy.odometry import yaw_of
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import load_vehicle
-from tests.deploy.command_streams import Loopback, encode
+from tests.flight.command_streams import Loopback, encode
 
 VEHICLE = load_vehicle("vis_r")
 HEIGHT = 1.2

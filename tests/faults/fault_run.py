@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.pilot.flight_state import Mode, Reason
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.logs.flight_log import read_log
+from e2efly.logs.telemetry import Telemetry
 from e2efly.validation.rig import STEP_S
 from tests.faults.faults import End, Fault
 from tests.faults.stage import FENCE, Stage, Trace

@@ -10,12 +10,12 @@ from enum import StrEnum
 import numpy as np
 
 from e2efly.control.vectors import Quat
-from e2efly.deploy.betaflight.messages import BatteryState, FcVariant, StatusEx
-from e2efly.deploy.betaflight.settings import RcTuning, RxMap
-from e2efly.deploy.odometry import Odometry, Sample, yaw_of
-from e2efly.deploy.pilot.estimate import OUTLIERS_S
-from e2efly.deploy.pilot.fence import fence_problem
-from e2efly.deploy.pilot.flight_state import Mode, Reason
+from e2efly.flight.betaflight.messages import BatteryState, FcVariant, StatusEx
+from e2efly.flight.betaflight.settings_messages import RcTuning, RxMap
+from e2efly.flight.pilot.estimate import OUTLIERS_S
+from e2efly.flight.pilot.fence import fence_problem
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.policy.odometry import Odometry, Sample, yaw_of
 from tests.faults.stage import FENCE, LATENCY_S, POSE_S, SETTINGS, Stage
 
 RECEIVER_S = 0.05

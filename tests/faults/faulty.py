@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.betaflight.codec import REPLY, Decoder, Frame, encode
-from e2efly.deploy.betaflight.link import StreamLink
-from e2efly.deploy.betaflight.messages import SET_RAW_RC
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.source import PoseSource
-from e2efly.deploy.sight import source as sight
+from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.link import StreamLink
+from e2efly.flight.betaflight.messages import SET_RAW_RC
+from e2efly.flight.pose.pose_source import PoseSource
+from e2efly.flight.sight import image_source as sight
+from e2efly.policy.odometry import Sample
 
 GARBAGE = 40
 """Longest burst of random bytes, bytes."""

@@ -5,18 +5,18 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from e2efly.deploy.policy.loader import Policy
-from e2efly.deploy.settings import FlightSettings
-from e2efly.env import Env
-from e2efly.evaluation import Candidate, candidate
-from e2efly.goal import Course
+from e2efly.environment import Env
+from e2efly.flight.settings import FlightSettings
+from e2efly.policy.goal import Course
+from e2efly.policy.loader import Policy
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
+from e2efly.validation.bridge_session import rehearsal_settings
+from e2efly.validation.evaluation import Candidate, candidate
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
-from e2efly.validation.session import rehearsal_settings
 from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.injected_fliers import BEYOND
 from tests.faults.injection import Flier

@@ -15,18 +15,18 @@ from unittest import mock
 
 import numpy as np
 
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.policy.images import Image
-from e2efly.deploy.sight import capture
-from e2efly.deploy.sight.capture import Captured
-from e2efly.deploy.sight.source import Frame, ImageSource
-from e2efly.evaluation import Candidate
-from e2efly.validation.firmware import Firmware
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.sight import captured
+from e2efly.flight.sight.captured import Captured
+from e2efly.flight.sight.image_source import Frame, ImageSource
+from e2efly.policy.images import Image
+from e2efly.validation.bridge_session import Session, rehearsal_settings
+from e2efly.validation.evaluation import Candidate
+from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import Vehicle
 from tests.faults.camera_process import FRAME
 
@@ -102,7 +102,7 @@ class ProcessCamera:
         with socket.socket(socket.AF_UNIX) as server:
             server.bind(path)
             server.listen(1)
-            with mock.patch.object(capture, "SCRIPT", str(Path(__file__).with_name("camera_process.py"))):
+            with mock.patch.object(captured, "SCRIPT", str(Path(__file__).with_name("camera_process.py"))):
                 self._pending: list[socket.socket] = []
                 self._source = _opened(server, camera, path, self._pending)
         (self._cable,) = self._pending

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.betaflight.codec import encode
-from e2efly.deploy.betaflight.instruments import CLOSED, PROBE
-from e2efly.deploy.betaflight.messages import set_raw_rc
+from e2efly.flight.betaflight.codec import encode
+from e2efly.flight.betaflight.instruments import CLOSED, PROBE
+from e2efly.flight.betaflight.messages import set_raw_rc
 from tests.faults.faults import wall_clock
 from tests.faults.faulty import sticks
 from tests.faults.injected_poses import stepped

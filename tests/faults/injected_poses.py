@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.control.vectors import Quat
-from e2efly.deploy.odometry import Sample
+from e2efly.policy.odometry import Sample
 from tests.faults.injection import Injection, Kind, one_of, uniform, vector
 from tests.faults.stage import Stage
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.sight.source import Frame
+from e2efly.flight.sight.image_source import Frame
+from e2efly.policy.odometry import Sample
 from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles import Vehicle
 

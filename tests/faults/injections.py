@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from e2efly.deploy.betaflight.messages import RawImu, StatusEx
-from e2efly.deploy.betaflight.modes import FAILSAFE
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.sight.source import Frame
+from e2efly.flight.betaflight.allowed_modes import FAILSAFE
+from e2efly.flight.betaflight.messages import RawImu, StatusEx
+from e2efly.flight.sight.image_source import Frame
+from e2efly.policy.odometry import Sample
 from e2efly.validation.sitl import FirmwareState
 from tests.faults.injected_companion import COMPANION
 from tests.faults.injected_fliers import FLIERS

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.betaflight.watchdog import TIMEOUT_S
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.validation.room import FLIGHT_S, Program, Room, bridge, take_off
+from e2efly.flight.betaflight.watchdog import TIMEOUT_S
+from e2efly.logs.flight_log import read_log
+from e2efly.validation.processes import FLIGHT_S, Program, Room, bridge, take_off
 from tests.faults.tap import Tap
 
 PERIOD_S = 0.01

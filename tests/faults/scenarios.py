@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.pilot.flight_state import Mode
+from e2efly.flight.pilot.flight_state import Mode
 from tests.faults.campaign import STRUCK_IN, Scenario
 from tests.faults.injection import Flier, Parameters
 from tests.faults.injections import KINDS, Strike

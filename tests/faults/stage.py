@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.betaflight.check import examine
-from e2efly.deploy.betaflight.link import open_link
-from e2efly.deploy.betaflight.row import problems
-from e2efly.deploy.flight_loop import PLAN_PERIOD, plan_of
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.odometry import tilt_of
-from e2efly.deploy.pilot.flight_state import Mode, Reason
-from e2efly.deploy.policy.loader import Policy
-from e2efly.deploy.pose.source import PlantSource
-from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.deploy.sight.source import ImageSource
-from e2efly.goal import Course
+from e2efly.flight.betaflight.link import open_link
+from e2efly.flight.betaflight.row import problems
+from e2efly.flight.betaflight.settings_check import examine
+from e2efly.flight.flight_loop import PLAN_PERIOD, plan_of
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.logs.telemetry import Telemetry
+from e2efly.policy.goal import Course
+from e2efly.policy.loader import Policy
+from e2efly.policy.odometry import tilt_of
+from e2efly.validation.bridge_session import Session, run
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, run
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
-from tests.deploy.command_streams import Loopback, encode
 from tests.faults.faulty import FaultyImages, FaultyLink, FaultyNetwork, FaultyPoses
 from tests.faults.virtual_watchdog import VirtualWatchdog
+from tests.flight.command_streams import Loopback, encode
 
 FENCE = Fence(low=(-3.0, -3.0, 0.1), high=(3.0, 3.0, 3.0))
 """Of all flights with faults."""

@@ -6,8 +6,8 @@ import threading
 import time
 from contextlib import suppress
 
-from e2efly.deploy.betaflight.codec import Decoder
-from e2efly.deploy.betaflight.messages import SET_RAW_RC
+from e2efly.flight.betaflight.codec import Decoder
+from e2efly.flight.betaflight.messages import SET_RAW_RC
 
 THROTTLE = 2
 """Where the throttle stands in a stick frame, in the order AETR."""

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
-from e2efly.deploy.betaflight import watchdog
-from e2efly.deploy.betaflight.link import Link
-from e2efly.deploy.betaflight.watchdog import Plan, WatchedLink
+from e2efly.flight.betaflight import watchdog
+from e2efly.flight.betaflight.link import Link
+from e2efly.flight.betaflight.watchdog import Plan, WatchedLink
 
 UNUSED = "tcp:127.0.0.1:1"
 """The link that a process would open; the thread is given one."""

@@ -10,25 +10,26 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly import evaluation, presets
 from e2efly.commands.eval import parse as parse_eval
 from e2efly.commands.train import parse as parse_train
 from e2efly.config import NetworkConfig
 from e2efly.courses.gates import Tracks
 from e2efly.courses.random_tracks import CANDIDATES, CLEAR, FEWEST, LOWEST, MOST, NUMBERS, OPENING, random_tracks
 from e2efly.courses.tracks import load_track, track_names
-from e2efly.deploy.policy.contract import Contract
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.env import Env, random_key
-from e2efly.goal import Shape
-from e2efly.learn.export import contract_of, export_policy
-from e2efly.learn.networks import Actor, Weights
+from e2efly.environment import Env, random_key
+from e2efly.learning.networks import Actor, Weights
+from e2efly.learning.onnx_export import contract_of, export_policy
+from e2efly.policy.contract import Contract
+from e2efly.policy.goal import Shape
+from e2efly.policy.loader import load_policy
+from e2efly.runs import presets
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.any_goal import Memory
 from e2efly.tasks.race.any_world import AnyRace
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import course_for, fields_of
 from e2efly.tasks.task import at_rest, make_task
+from e2efly.validation import evaluation
 from e2efly.validation.starts import draw_starts
 from e2efly.vehicles import load_vehicle
 

@@ -13,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly import presets
 from e2efly.control import Quat
 from e2efly.courses.tracks import load_track
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy.contract import Contract
-from e2efly.env import Env, random_key
-from e2efly.goal import Course, Shape
-from e2efly.learn.export import contract_of
+from e2efly.environment import Env, random_key
+from e2efly.learning.onnx_export import contract_of
+from e2efly.policy.contract import Contract
+from e2efly.policy.goal import Course, Shape
+from e2efly.policy.odometry import Odometry
+from e2efly.runs import presets
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.land.goal import LandRoute

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly import rewards
 from e2efly.config import CameraConfig
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.env import random_key
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler, normalize
-from e2efly.scenes.camera import look, mount
-from e2efly.scenes.scene import OBSTACLE
+from e2efly.environment import random_key
+from e2efly.simulation import rewards
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler, normalize
+from e2efly.simulation.scenes.camera import look, mount
+from e2efly.simulation.scenes.scene import OBSTACLE
 from e2efly.tasks.hover_aware import HoverAwareConfig
 from e2efly.tasks.hover_aware.goal import OUTSIDE, Memory
 from e2efly.tasks.hover_aware.world import HoverAware

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.scenes.scene import Solids
+from e2efly.simulation.scenes.scene import Solids
 from e2efly.tasks.avoid.pilot import FAN, best_heading
 
 RADIUS = 0.12

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from e2efly.courses.tracks import load_track, track_names
-from e2efly.env import random_key
+from e2efly.environment import random_key
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.world import Race

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from e2efly.courses.references import KNOT_PERIOD, Lissajous, Spline, read_csv, through_points
-from e2efly.env import random_key
-from e2efly.tasks.references import polynomial
+from e2efly.environment import random_key
+from e2efly.tasks.track.splines import polynomial
 
 pytestmark = pytest.mark.usefixtures("x64")
 

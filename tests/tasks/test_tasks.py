@@ -11,8 +11,8 @@ import pytest
 
 from e2efly.courses.references import Lissajous, read_csv, through_points
 from e2efly.courses.tracks import load_track, track_names
-from e2efly.env import random_key
-from e2efly.physics.rotation import from_euler
+from e2efly.environment import random_key
+from e2efly.simulation.physics.rotation import from_euler
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.hover.world import Hover
@@ -20,9 +20,9 @@ from e2efly.tasks.land import LandConfig
 from e2efly.tasks.land.world import Land
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.world import Race
-from e2efly.tasks.references import polynomial
 from e2efly.tasks.task import Outcome, Shape, at_rest
 from e2efly.tasks.track import TrackConfig
+from e2efly.tasks.track.splines import polynomial
 from e2efly.tasks.track.world import Track
 
 SHAPE = Shape(0.05, 0.12)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from e2efly.courses.gates import Tracks
+from e2efly.courses.solids import DISC, SQUARE, TRIANGLE
 from e2efly.courses.tracks import load_track
-from e2efly.env import random_key
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Solids, clearance
-from e2efly.solids import DISC, SQUARE, TRIANGLE
+from e2efly.environment import random_key
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Solids, clearance
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race.any_goal import Ahead

@@ -14,9 +14,9 @@ import jax
 import numpy as np
 
 from e2efly.config import CameraConfig
-from e2efly.scenes import camera
-from e2efly.scenes.scene import Scene
-from e2efly.solids import CLASSES
+from e2efly.courses.solids import CLASSES
+from e2efly.simulation.scenes import camera
+from e2efly.simulation.scenes.scene import Scene
 
 SEES: dict[int, Any] = {0: "rgb", 1: "depth", 2: "range", 5: "label"}
 SKY = 65504.0

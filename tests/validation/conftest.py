@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from e2efly import presets
 from e2efly.config import NetworkConfig
-from e2efly.env import Env
-from e2efly.learn.export import contract_of, export_policy
-from e2efly.learn.networks import Actor, Features, Layers, Weights
-from e2efly.registry import is_shipped
+from e2efly.config.registry import is_shipped
+from e2efly.environment import Env
+from e2efly.learning.networks import Actor, Features, Layers, Weights
+from e2efly.learning.onnx_export import contract_of, export_policy
+from e2efly.runs import presets
 from e2efly.validation.plants import PLANTS
 from e2efly.vehicles.vehicle import GRAVITY
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.check import examine
-from e2efly.deploy.betaflight.messages import set_raw_rc
-from e2efly.deploy.betaflight.row import problems
-from e2efly.deploy.betaflight.settings import PidAdvanced
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.validation import firmware, rig
+from e2efly.flight.betaflight.messages import set_raw_rc
+from e2efly.flight.betaflight.row import problems
+from e2efly.flight.betaflight.settings_check import examine
+from e2efly.flight.betaflight.settings_messages import PidAdvanced
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.validation import firmware_program, rig
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -25,7 +25,7 @@ def session_of(folder: Path, monkeypatch: pytest.MonkeyPatch, *lines: str) -> It
     """A bridge on firmware that is set by `SETTINGS` and further lines, and told what forbids a take-off."""
     prepare = rig.prepare
     monkeypatch.setattr(rig, "prepare", lambda sitl, settings: prepare(sitl, (*settings, *lines)))
-    with Rig(firmware.chosen(), folder, VEHICLE) as running:
+    with Rig(firmware_program.chosen(), folder, VEHICLE) as running:
         session = Session(running, rehearsal_settings(1.0))
         session.bridge.settings_problems = problems(examine(session.info, VEHICLE, session.settings))
         yield session

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.control import Quat
-from e2efly.validation.airsim import frames, model, protocol
+from e2efly.validation.airsim import frames, protocol, vehicle_model
+from e2efly.validation.airsim.lockstep import Session
 from e2efly.validation.airsim.rpc import Rpc, RpcError
-from e2efly.validation.airsim.session import Session
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
@@ -243,10 +243,10 @@ def test_what_is_measured_is_what_the_vehicle_has(server: Server, vis_r: Vehicle
         measured.drag, 5 * (vis_r.drag_linear + 5 * vis_r.drag_quadratic) / vis_r.mass, rtol=0.05
     )
     np.testing.assert_allclose(measured.gains(vis_r.rate_gain) * server.world._authority, vis_r.rate_gain, rtol=0.03)
-    assert model.differences(measured, vis_r) == []
+    assert vehicle_model.differences(measured, vis_r) == []
     plant.close()
     other = dataclasses.replace(vis_r, mass=vis_r.mass * 1.2, motor_time_constant=2 * vis_r.motor_time_constant)
-    told = " ".join(model.differences(measured, other))
+    told = " ".join(vehicle_model.differences(measured, other))
     assert "full thrust over mass of 27.3 m/s^2; vis_r has 22.8" in told
     assert "lag of thrust" in told
     assert "drag over mass at 5 m/s along z" in told
@@ -359,8 +359,8 @@ def test_settings_for_a_vehicle_and_a_camera(tmp_path: Path, capsys: pytest.Capt
     assert content["ClockType"] == "SteppableClock"
     assert (content["ApiServerPort"], content["LocalHostIp"]) == (41500, "127.0.0.1")
     (camera,) = content["Vehicles"]["vis_r"]["Cameras"].values()
-    from e2efly.deploy.policy.loader import load_policy
-    from e2efly.zoo import policy_file
+    from e2efly.policy.loader import load_policy
+    from e2efly.policy.zoo import policy_file
 
     (image,) = load_policy(policy_file("avoid")).contract.images
     capture = camera["CaptureSettings"][0]

@@ -11,28 +11,28 @@ import jax
 import numpy as np
 import pytest
 
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.config import CameraConfig
-from e2efly.deploy.policy.contract import Contract
-from e2efly.deploy.policy.images import Image
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.evaluation import SEED, candidate
-from e2efly.sensors.eyes import Eye
-from e2efly.validation.airsim.camera import camera_of, opened, taken
-from e2efly.validation.airsim.images import DEPTH_PERSPECTIVE, DEPTH_PLANAR, SCENE, SEGMENTATION, fields_of_view
+from e2efly.policy.contract import Contract
+from e2efly.policy.images import Image
+from e2efly.policy.loader import load_policy
+from e2efly.policy.zoo import policy_file
+from e2efly.simulation.sensors.eyes import Eye
+from e2efly.validation.airsim.airsim_camera import camera_of, opened, taken
+from e2efly.validation.airsim.airsim_images import DEPTH_PERSPECTIVE, DEPTH_PLANAR, SCENE, SEGMENTATION, fields_of_view
+from e2efly.validation.airsim.lockstep import Session
 from e2efly.validation.airsim.rpc import Rpc, RpcError
-from e2efly.validation.airsim.session import Session
-from e2efly.validation.airsim.settings import settings, unsaid
+from e2efly.validation.airsim.settings_file import settings, unsaid
+from e2efly.validation.evaluation import SEED, candidate
 from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.plant import RigidState, Shutter
+from e2efly.validation.plant_sight import Sight
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.reality import Reality
-from e2efly.validation.sight import Sight
 from e2efly.validation.starts import draw_starts
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import GRAVITY
-from e2efly.zoo import policy_file
 from tests.validation.airsim_client import Tap, packed, published
 from tests.validation.airsim_eyes import PAD, PALETTE
 from tests.validation.airsim_server import Server, World

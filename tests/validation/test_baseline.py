@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.baseline import Baseline
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.control import Quat
-from e2efly.deploy.policy.loader import level_and_still, load_policy
-from e2efly.evaluation import candidate
-from e2efly.stress import stress
+from e2efly.policy.loader import level_and_still, load_policy
 from e2efly.tasks.race.goal import CRUISE, RaceGoal
 from e2efly.tasks.track.goal import TrackGoal
+from e2efly.validation.baseline import Baseline
+from e2efly.validation.evaluation import candidate
+from e2efly.validation.stress import stress
 from e2efly.vehicles import load_vehicle
 
 NAMES = "pid", "geometric", "indi", "mpc"

@@ -8,9 +8,9 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.link import StreamLink
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.sight.source import Frame
+from e2efly.flight.betaflight.link import StreamLink
+from e2efly.flight.sight.image_source import Frame
+from e2efly.policy.odometry import Sample
 from tests.faults import blocks
 from tests.faults.campaign import STRUCK_IN, Scenario, beyond
 from tests.faults.campaign_rules import Span, judge

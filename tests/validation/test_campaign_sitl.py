@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.messages import RawImu
-from e2efly.deploy.policy.loader import load_policy
+from e2efly.flight.betaflight.messages import RawImu
+from e2efly.policy.loader import load_policy
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
-from e2efly.validation import firmware
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 from tests.faults.campaign import Scenario, fly
@@ -21,7 +21,7 @@ from tests.faults.stage import LATENCY_S, TARGET, Gear, Stage
 
 def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     scenario = Scenario("", "takeoff", (Strike("poses: none", 0.6),), 0.7)
-    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware_program.chosen(), tmp_path)
     assert flown.violations == ()
     assert flown.ended
     assert 0.2 < flown.touch_speed < 1.5
@@ -53,7 +53,7 @@ def test_poses_that_end_in_a_take_off_break_no_rule(policy_of: Callable[..., Pat
 def test_what_ended_badly_once_breaks_no_rule(name: str, policy_of: Callable[..., Path], tmp_path: Path) -> None:
     """Each of these climbed away, fell, touched too fast, or stood armed for as long as it was watched."""
     (scenario,) = (case for case in CASES if case.name == name)
-    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware_program.chosen(), tmp_path)
     assert flown.violations == ()
     assert flown.ended
 
@@ -65,7 +65,7 @@ def test_what_drifted_while_nothing_was_heard_stops_there_and_lands(
 ) -> None:
     """It does not fly back to where it was: it would touch the ground on its way, at up to 2 m/s."""
     scenario = Scenario("", "hover", (Strike("link: silent", 2.0 + shift, 3.0),), 0.8)
-    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware_program.chosen(), tmp_path)
     assert flown.violations == ()
     assert flown.touch_speed < 0.8
     assert flown.ended
@@ -74,7 +74,7 @@ def test_what_drifted_while_nothing_was_heard_stops_there_and_lands(
 def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     policy, vehicle = load_policy(policy_of("hover")), load_vehicle("vis_r")
     goal = course_for(policy.contract, vehicle, HoverRoute(target=TARGET))
-    with Rig(firmware.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
+    with Rig(firmware_program.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
         stage = Stage(rig, policy, goal, gear=Gear(watched=True, log=tmp_path / "flight.mcap"))
         stage.fly(0.2)
         gravity = stage.session.client.latest[RawImu.CODE].message.acceleration
@@ -99,7 +99,7 @@ def test_a_bridge_that_stands_still_in_hover_is_landed_by_the_watchdog(
     policy_of: Callable[..., Path], tmp_path: Path
 ) -> None:
     scenario = Scenario("", "hover", (Strike("bridge: stopped", 0.0, 0.5),), 0.7)
-    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware.chosen(), tmp_path)
+    flown = fly(scenario, load_policy(policy_of("hover")), load_vehicle("vis_r"), firmware_program.chosen(), tmp_path)
     assert flown.violations == ()
     assert flown.ended
     assert "the watchdog has taken over" in flown.reasons[0]

@@ -6,20 +6,20 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.pilot.flight_state import Mode, Reason
-from e2efly.validation import firmware
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.logs.flight_log import read_log
+from e2efly.logs.telemetry import Telemetry
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.vehicle import GRAVITY
-from tests.deploy.command_streams import Loopback
 from tests.faults.commanders import FAULTS, HOME, STEP, TIMEOUT, VEHICLE, Field, at
+from tests.flight.command_streams import Loopback
 
 
 @pytest.fixture(scope="module")
 def field(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Field]:
     folder = tmp_path_factory.mktemp("commands")
-    rig = Rig(firmware.chosen(), folder, VEHICLE, latency=0.03, seed=4)
+    rig = Rig(firmware_program.chosen(), folder, VEHICLE, latency=0.03, seed=4)
     with Telemetry(folder / "flight.mcap") as log, Loopback() as link, rig:
         rig.sleep(0.5)
         flight = Field(rig, link, log)

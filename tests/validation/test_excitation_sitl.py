@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.pilot.fence import fence_problem
-from e2efly.deploy.pilot.flight_state import Mission, Mode, Reason
-from e2efly.deploy.settings import Fence
-from e2efly.identification.blackbox import setpoint_delay, with_blackboxes
-from e2efly.identification.checks import checked
-from e2efly.identification.flight import driver_of
-from e2efly.identification.readers import read_flights
-from e2efly.validation import firmware
-from e2efly.validation.excited import fly_excited
+from e2efly.alignment.checks import checked
+from e2efly.alignment.identification import driver_of
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.flight.pilot.fence import fence_problem
+from e2efly.flight.pilot.flight_state import Mission, Mode, Reason
+from e2efly.flight.settings import Fence
+from e2efly.logs.blackbox_merge import setpoint_delay, with_blackboxes
+from e2efly.logs.readers import read_flights
+from e2efly.logs.telemetry import Telemetry
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import Session, rehearsal_settings
+from e2efly.validation.firmware_excitation import fly_excited
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles import load_vehicle
 
 FILE = load_vehicle("vis_r")
@@ -32,7 +32,14 @@ def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: 
     log = tmp_path / "flight.mcap"
     with Telemetry(log) as telemetry:
         flight = fly_excited(
-            firmware.chosen(), FILE, BODY, SETTINGS, options=SHORT, log=telemetry, folder=tmp_path, blackbox=True
+            firmware_program.chosen(),
+            FILE,
+            BODY,
+            SETTINGS,
+            options=SHORT,
+            log=telemetry,
+            folder=tmp_path,
+            blackbox=True,
         )
     assert flight.complete
     changes = {mode: (at, reasons) for at, mode, reasons in flight.flown.changes}
@@ -64,7 +71,7 @@ def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: 
 @pytest.mark.whole
 def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
     acts, course = excitation(FILE, SETTINGS, SHORT)
-    with Rig(firmware.chosen(), tmp_path, FILE, latency=0.03) as rig:
+    with Rig(firmware_program.chosen(), tmp_path, FILE, latency=0.03) as rig:
         rig.sleep(0.5)
         session = Session(rig, SETTINGS, policy=acts, course=course, schedule=EXCITATION_SCHEDULE)
         try:

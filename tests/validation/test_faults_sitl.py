@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.deploy.policy.loader import load_policy
+from e2efly.policy.loader import load_policy
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
-from e2efly.validation import firmware
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.vehicles import load_vehicle
 from tests.faults import process_faults
@@ -42,7 +42,7 @@ class Hangar:
         vehicle = load_vehicle("vis_r")
         goal = course_for(self.policy.contract, vehicle, HoverRoute(target=TARGET))
         folder = self.folder / f"firmware{self._count}"
-        rig = self._open.enter_context(Rig(firmware.chosen(), folder, vehicle, latency=LATENCY_S))
+        rig = self._open.enter_context(Rig(firmware_program.chosen(), folder, vehicle, latency=LATENCY_S))
         stage = Stage(rig, self.policy, goal)
         self._open.callback(stage.close)
         stage.fly(0.3)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from e2efly.commands.fly_report import FlyReport, run
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.pilot.flight_state import Mode, Reason
-from e2efly.deploy.settings import Fence
-from e2efly.validation import firmware
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.flight.settings import Fence
+from e2efly.logs.telemetry import Telemetry
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.vehicles.vehicle import GRAVITY
-from tests.deploy.command_streams import Loopback
 from tests.faults.commanders import VEHICLE, Commands, Field, at
+from tests.flight.command_streams import Loopback
 
 FENCE = Fence(low=(-2.5, -2.5, 0.4), high=(2.5, 2.5, 3.5), speed=5.0, tilt=1.2)
 SETTINGS = dataclasses.replace(rehearsal_settings(1.5), fence=FENCE)
@@ -40,7 +40,7 @@ def field(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder = tmp_path_factory.mktemp("filter")
     log = folder / "flight.mcap"
     with ExitStack() as open_:
-        rig = Rig(firmware.chosen(), folder, VEHICLE, latency=0.05, seed=2)
+        rig = Rig(firmware_program.chosen(), folder, VEHICLE, latency=0.05, seed=2)
         telemetry, link = open_.enter_context(Telemetry(log)), open_.enter_context(Loopback())
         open_.enter_context(rig)
         rig.sleep(0.5)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.config import RewardConfig, TaskConfig
-from e2efly.env import Env
+from e2efly.environment import Env
 from e2efly.tasks import TASKS
 from e2efly.validation.plant import EVERYTHING
+from e2efly.validation.plant_stress import stress
 from e2efly.validation.plants import PLANTS
 from e2efly.validation.reality import altered
-from e2efly.validation.stress import stress
 from e2efly.vehicles import Flown, load_vehicle, vehicle_file
 from e2efly.vehicles.vehicle import CONTROLLED
 

@@ -14,17 +14,17 @@ import jax
 import numpy as np
 import pytest
 
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.commands.hil import parse
 from e2efly.courses.origin import Origin
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.sight.shared import SharedCamera, place
-from e2efly.evaluation import candidate
-from e2efly.validation.hil import ahead
+from e2efly.flight.sight.shared import SharedCamera, place
+from e2efly.policy.odometry import Odometry
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.plant import RigidState
-from e2efly.validation.room import flags
+from e2efly.validation.plant_sight import rendered
+from e2efly.validation.processes import flags
 from e2efly.validation.scenery import Scenery
-from e2efly.validation.sight import rendered
+from e2efly.validation.virtual_world import ahead
 from tests.waiting import free_port
 
 NAME = "e2efly_test_hil"

@@ -12,15 +12,15 @@ import pytest
 
 from e2efly.config import CameraConfig
 from e2efly.courses.origin import Origin
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.source import PlantSource
-from e2efly.env import Env
-from e2efly.evaluation import candidate
-from e2efly.scenes.meshes.load import load_mesh_scene
+from e2efly.environment import Env
+from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.policy.odometry import Sample
+from e2efly.simulation.scenes.meshes.load import load_mesh_scene
 from e2efly.tasks.avoid.world import Avoid
-from e2efly.validation.hil import Node, ahead
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.starts import draw_starts
+from e2efly.validation.virtual_world import Node, ahead
 
 SEED = 7
 ORIGIN = Origin((1.0, -2.0, 0.5), 0.4)

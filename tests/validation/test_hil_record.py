@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.deploy.sight.record import Recorder
-from e2efly.deploy.sight.shared import SharedImages, place
-from e2efly.view.latency import plot_latencies
-from e2efly.zoo import policy_file
+from e2efly.flight.sight.recorder import Recorder
+from e2efly.flight.sight.shared import SharedImages, place
+from e2efly.policy.loader import load_policy
+from e2efly.policy.zoo import policy_file
+from e2efly.viewing.latencies import plot_latencies
 from tests.waiting import free_port
 
 CAMERA = load_policy(policy_file("avoid")).contract.images[0]

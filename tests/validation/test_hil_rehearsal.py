@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.courses.origin import Origin
 from e2efly.courses.tracks import load_track, track_text
-from e2efly.deploy.pose.json_source import parse_pose
-from e2efly.deploy.settings import Fence, FlightSettings
-from e2efly.evaluation import candidate
+from e2efly.flight.pose.json_source import parse_pose
+from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.hil_lap import Change, Lap, Spread, Truth, verdict
-from e2efly.validation.hil_rehearsal import LOOP_S, Drawn, Plan, draw, unlike
 from e2efly.validation.link_process import Line
 from e2efly.validation.mocap_process import ATTITUDE, POSITION, Camera, Marks
-from e2efly.validation.room import Program, flags
+from e2efly.validation.processes import Program, flags
+from e2efly.validation.rehearse_hil import LOOP_S, Drawn, Plan, draw, unlike
 
 POSE = {"position": [1.0, 2.0, 3.0], "quaternion": [0.6, 0.0, 0.8, 0.0], "velocity": [0, 0, 0], "stamp": 5.0}
 

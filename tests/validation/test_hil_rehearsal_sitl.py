@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.deploy.sight.shared import place
-from e2efly.evaluation import candidate
-from e2efly.validation import firmware
-from e2efly.validation.hil_rehearsal import Plan, rehearse
+from e2efly.flight.sight.shared import place
+from e2efly.validation import firmware_program
+from e2efly.validation.evaluation import candidate
+from e2efly.validation.rehearse_hil import Plan, rehearse
 
 PATIENT = (
     "--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5", "--flight.lateness", "0.2",
@@ -23,7 +23,7 @@ PATIENT = (
 
 @pytest.fixture(scope="module", autouse=True)
 def built() -> None:
-    firmware.build()
+    firmware_program.build()
 
 
 def left_behind(folder: Path, rehearses: int) -> list[str]:

@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 import trimesh
 
-from e2efly.cli import run
 from e2efly.commands import hil
+from e2efly.commands.cli import run
 from e2efly.commands.options import parse
 from e2efly.commands.render import Render
 from e2efly.courses.origin import Origin
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pose.source import PlantSource
-from e2efly.deploy.sight.shared import place
-from e2efly.env import random_key
-from e2efly.evaluation import candidate
-from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import Scene, Solids
-from e2efly.validation.hil import STRUCK_S, Node
-from e2efly.validation.hil_rehearsal import Plan, draw
+from e2efly.environment import random_key
+from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.flight.sight.shared import place
+from e2efly.policy.odometry import Sample
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
+from e2efly.simulation.scenes.scene import Scene, Solids
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.plant import RigidState
+from e2efly.validation.rehearse_hil import Plan, draw
 from e2efly.validation.scene_files import SceneFile, beside, ground_of, load_world
 from e2efly.validation.scenery import Scenery
-from e2efly.view.places import find_place
+from e2efly.validation.virtual_world import STRUCK_S, Node
+from e2efly.viewing.places import find_place
 from tests.validation.test_hil_images import Kept
 
 ROOM = "[[solids]]\nkind = 'box'\ncentre = [5, 0, 1.5]\nsize = [0.1, 4, 1.5]\n"

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.check import check_hover
-from e2efly.deploy.betaflight.client import SCHEDULE, Client
-from e2efly.deploy.betaflight.controller import identify
-from e2efly.deploy.betaflight.link import open_link
-from e2efly.deploy.betaflight.messages import MotorTelemetry
-from e2efly.deploy.pilot.flight_state import Mode
-from e2efly.deploy.pilot.hovering import hover_controller
-from e2efly.validation import firmware
+from e2efly.flight.betaflight.client import SCHEDULE, Client
+from e2efly.flight.betaflight.controller import identify
+from e2efly.flight.betaflight.link import open_link
+from e2efly.flight.betaflight.messages import MotorTelemetry
+from e2efly.flight.betaflight.settings_check import check_hover
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.pilot.hovering import hover_controller
+from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.session import Session, rehearsal_settings
 from e2efly.validation.speeds import SpeedLink
 from e2efly.vehicles import load_vehicle
 
@@ -24,7 +24,7 @@ WIND = np.array([3.0, 0.0, 0.0])
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    with Rig(firmware.chosen(), tmp_path_factory.mktemp("hovering"), VEHICLE, latency=LATENCY, seed=4) as rig:
+    with Rig(firmware_program.chosen(), tmp_path_factory.mktemp("hovering"), VEHICLE, latency=LATENCY, seed=4) as rig:
         rig.sleep(0.5)
         yield rig
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
+from e2efly.commands.cli import run
 from e2efly.control import Quat, Vec3
-from e2efly.identification.csv_file import read_csv
+from e2efly.logs.csv_file import read_csv
 
 
 @pytest.mark.whole

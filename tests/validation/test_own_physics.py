@@ -11,7 +11,7 @@ import pytest
 import e2efly
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import load_track
-from e2efly.goal import Shape
+from e2efly.policy.goal import Shape
 from e2efly.tasks.track.goal import TrackRoute
 from e2efly.validation.plant import Plant, RigidState
 from e2efly.validation.plants import find_plant

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import e2efly
-from e2efly.cli import run
-from e2efly.registry import load
+from e2efly.commands.cli import run
+from e2efly.config.registry import load
 from e2efly.validation.plants import PLANTS, find_plant
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import Physics, State, started
+from e2efly.simulation.physics import Physics, State, started
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
 from e2efly.vehicles import Vehicle, load_vehicle

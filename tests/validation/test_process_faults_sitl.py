@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.validation import firmware
+from e2efly.validation import firmware_program
 from tests.conftest import NetworkTrace
 from tests.faults import process_faults
 
@@ -13,7 +13,7 @@ from tests.faults import process_faults
 @pytest.fixture(scope="module", autouse=True)
 def built() -> None:
     """The firmware is there before the test looks at what its processes say to the network."""
-    firmware.build()
+    firmware_program.build()
 
 
 @pytest.mark.parametrize("fault", process_faults.FAULTS)

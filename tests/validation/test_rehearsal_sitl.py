@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.policy.loader import load_policy
-from e2efly.validation import firmware
+from e2efly.logs.flight_log import read_log
+from e2efly.logs.telemetry import Telemetry
+from e2efly.policy.loader import load_policy
+from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import rehearse
 from e2efly.vehicles import load_vehicle
 
@@ -17,7 +17,7 @@ from e2efly.vehicles import load_vehicle
 def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[..., Path], tmp_path: Path) -> None:
     vehicle, policy = load_vehicle("vis_r"), load_policy(policy_of("hover"))
     with Telemetry(tmp_path / "flight.mcap") as log:
-        flight = rehearse(firmware.chosen(), policy, vehicle, seed=3, log=log)
+        flight = rehearse(firmware_program.chosen(), policy, vehicle, seed=3, log=log)
     assert flight.modes == ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
     assert flight.complete
     assert flight.hover_error < 0.10

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.betaflight.client import SCHEDULE, Client
-from e2efly.deploy.betaflight.controller import ControllerInfo, identify
-from e2efly.deploy.betaflight.link import open_link
-from e2efly.deploy.betaflight.messages import AttitudeReply, Rc, StatusEx, set_raw_rc
-from e2efly.deploy.betaflight.sticks import Sticks, sticks_of
-from e2efly.validation import firmware
+from e2efly.flight.betaflight.client import SCHEDULE, Client
+from e2efly.flight.betaflight.controller import ControllerInfo, identify
+from e2efly.flight.betaflight.link import open_link
+from e2efly.flight.betaflight.messages import AttitudeReply, Rc, StatusEx, set_raw_rc
+from e2efly.flight.betaflight.sticks import Sticks, sticks_of
+from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.validation.world import Body
 from e2efly.vehicles import load_vehicle
@@ -78,7 +78,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Rig(firmware.chosen(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
+    with Rig(firmware_program.chosen(), tmp_path_factory.mktemp("firmware"), VEHICLE) as rig:
         bench = Bench(rig)
         yield bench
         bench.client.link.close()
@@ -194,7 +194,7 @@ def test_it_hovers_where_thrust_equals_weight(bench: Bench) -> None:
 def test_a_silent_msp_is_held_or_handed_back_as_the_version_is_said_to(tmp_path: Path, override_failsafe: bool) -> None:
     """Why the bridge has a watchdog: where the last sticks are held, only the override switch ends them."""
     settings = (f"set msp_override_failsafe={'ON' if override_failsafe else 'OFF'}",)
-    with Rig(firmware.chosen(), tmp_path, VEHICLE, settings=settings) as rig:
+    with Rig(firmware_program.chosen(), tmp_path, VEHICLE, settings=settings) as rig:
         bench = Bench(rig)
         timeout = bench.info.release.override_timeout
         bench.arm()
@@ -242,8 +242,8 @@ def test_a_dead_link_leaves_a_vehicle_that_levels_itself(bench: Bench) -> None:
 
 def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> None:
     with (
-        Rig(firmware.chosen(), tmp_path / "a", VEHICLE, seed=1) as a,
-        Rig(firmware.chosen(), tmp_path / "b", VEHICLE, seed=1) as b,
+        Rig(firmware_program.chosen(), tmp_path / "a", VEHICLE, seed=1) as a,
+        Rig(firmware_program.chosen(), tmp_path / "b", VEHICLE, seed=1) as b,
     ):
         assert abs(a.sitl.base - b.sitl.base) >= 12
         for changes, seconds in (({"armed": True}, 0.4), ({"throttle": 0.4, "roll": 0.3}, 0.8)):
@@ -259,7 +259,7 @@ def test_two_at_once_have_ports_of_their_own_and_move_alike(tmp_path: Path) -> N
 
 
 def test_without_power_the_motors_stop_and_time_goes_on(tmp_path: Path) -> None:
-    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware_program.chosen(), tmp_path, VEHICLE) as rig:
         bench = Bench(rig)
         bench.arm()
         assert bench.armed

@@ -10,15 +10,15 @@ import pytest
 
 import e2efly
 from e2efly.config import CameraConfig
-from e2efly.env import Env
-from e2efly.env.stress import ALL, ROWS
-from e2efly.evaluation import SEED, candidate
-from e2efly.scenes.scene import Scene
-from e2efly.stress import draws
+from e2efly.environment import Env
+from e2efly.environment.stress_rows import ALL, ROWS
+from e2efly.simulation.scenes.scene import Scene
+from e2efly.validation.evaluation import SEED, candidate
 from e2efly.validation.plant import RigidState
-from e2efly.validation.sight import Sight, Watch
+from e2efly.validation.plant_sight import Sight, Watch
+from e2efly.validation.plant_stress import stress
 from e2efly.validation.starts import Starts, draw_starts
-from e2efly.validation.stress import stress
+from e2efly.validation.stress import draws
 from e2efly.vehicles import load_vehicle
 
 STEPS = 12

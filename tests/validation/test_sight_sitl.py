@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.deploy.log.flight_log import read_log
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.policy.images import Image
-from e2efly.deploy.sight.shared import SharedCamera, SharedImages, place
-from e2efly.deploy.sight.source import Frame, ImageSource
-from e2efly.evaluation import candidate
-from e2efly.validation import firmware
+from e2efly.flight.sight.image_source import Frame, ImageSource
+from e2efly.flight.sight.shared import SharedCamera, SharedImages, place
+from e2efly.logs.flight_log import read_log
+from e2efly.logs.telemetry import Telemetry
+from e2efly.policy.images import Image
+from e2efly.validation import firmware_program
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.rehearsal import rehearse
 from e2efly.validation.scenery import Scenery
 from e2efly.vehicles import load_vehicle
@@ -48,7 +48,7 @@ def test_a_policy_lands_on_a_pad_that_it_only_sees(tmp_path: Path) -> None:
     try:
         with Telemetry(path) as log:
             flight = rehearse(
-                firmware.chosen(), found.policy, VEHICLE, seed=5, scenery=scenery, log=log,
+                firmware_program.chosen(), found.policy, VEHICLE, seed=5, scenery=scenery, log=log,
                 wrap=lambda inner: Published(inner, camera),
             )  # fmt: skip
     finally:
@@ -64,7 +64,7 @@ def test_a_policy_lands_on_a_pad_that_it_only_sees(tmp_path: Path) -> None:
 @pytest.mark.whole
 @pytest.mark.parametrize("fault", ["silent", "all holes", "capture killed"])
 def test_a_camera_that_breaks_in_flight_ends_in_hover_within_a_control_step(fault: str) -> None:
-    ended = fly_with(firmware.chosen(), candidate("avoid"), VEHICLE, fault)
+    ended = fly_with(firmware_program.chosen(), candidate("avoid"), VEHICLE, fault)
     assert ended.mode == "hover"
     assert FAULTS[fault][1] in ended.reason
     assert ended.noticed_s <= 1 / 30 + 1e-6
@@ -73,7 +73,7 @@ def test_a_camera_that_breaks_in_flight_ends_in_hover_within_a_control_step(faul
 
 @pytest.mark.whole
 def test_a_camera_that_hangs_upside_down_is_never_flown_by() -> None:
-    ended = fly_with(firmware.chosen(), candidate("avoid"), VEHICLE, UPSIDE_DOWN)
+    ended = fly_with(firmware_program.chosen(), candidate("avoid"), VEHICLE, UPSIDE_DOWN)
     assert ended.mode == "hover"
     assert "upside down?" in ended.reason
     assert ended.landed

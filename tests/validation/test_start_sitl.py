@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.validation import firmware, sitl
+from e2efly.validation import firmware_program, sitl
 from e2efly.validation.sitl import Sitl
 
 LATE = """
@@ -51,7 +51,7 @@ def test_a_network_thread_that_comes_late_is_reached(tmp_path: Path, monkeypatch
     program = tmp_path / "late"
     subprocess.run(["gcc", "-pthread", "-o", str(program), str(tmp_path / "late.c")], check=True)
     monkeypatch.setattr(sitl, "BOOT_S", 3.0)
-    with Sitl(replace(firmware.build(), program=program), tmp_path / "run") as started:
+    with Sitl(replace(firmware_program.build(), program=program), tmp_path / "run") as started:
         started.advance(0.01)
         started.exchange()
 
@@ -60,7 +60,7 @@ def test_a_network_thread_that_comes_late_is_reached(tmp_path: Path, monkeypatch
 def test_a_port_that_somebody_takes_before_the_start_is_no_matter(
     kind: socket.SocketKind, offset: int, tmp_path: Path
 ) -> None:
-    bench = Sitl(firmware.build(), tmp_path)
+    bench = Sitl(firmware_program.build(), tmp_path)
     with socket.socket(socket.AF_INET, kind) as other:
         other.bind(("127.0.0.1", bench.base + offset))
         taken = bench.base
@@ -73,7 +73,7 @@ def test_a_port_that_somebody_takes_before_the_start_is_no_matter(
 
 def test_a_port_that_is_taken_while_it_is_off_is_told(tmp_path: Path) -> None:
     """Its link looks for it where it was."""
-    with Sitl(firmware.build(), tmp_path) as bench:
+    with Sitl(firmware_program.build(), tmp_path) as bench:
         bench.advance(0.01)
         bench.stop()
         with socket.socket() as other:

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.identification.align import align
-from e2efly.identification.checks import checked
-from e2efly.validation import firmware
+from e2efly.alignment.alignment import align
+from e2efly.alignment.checks import checked
+from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import Rig
 from e2efly.validation.steps import SIZES, fly_steps
@@ -19,7 +19,7 @@ VEHICLE = load_vehicle("vis_r")
 @pytest.mark.whole
 def test_the_simulator_is_aligned_with_the_firmware(tmp_path: Path) -> None:
     """Betaflight's rate loop is quicker than the file's, which held-out time shows."""
-    with Rig(firmware.chosen(), tmp_path, VEHICLE) as rig:
+    with Rig(firmware_program.chosen(), tmp_path, VEHICLE) as rig:
         record, steps = fly_steps(rig, (1.0,))
     assert [(s.channel, s.size) for s in steps] == list(enumerate(SIZES))
     sent = record.streams["command"]

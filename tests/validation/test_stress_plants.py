@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
-from e2efly.env.stress import ALL, ROWS, rows_for
-from e2efly.stress import Report, draws
-from e2efly.stress import stress as in_training
+from e2efly.commands.cli import run
+from e2efly.environment.stress_rows import ALL, ROWS, rows_for
 from e2efly.validation.plant import EVERYTHING, Plant
+from e2efly.validation.plant_stress import lacking, realities, stress
 from e2efly.validation.plants import PLANTS, find_plant
-from e2efly.validation.stress import lacking, realities, stress
+from e2efly.validation.stress import Report, draws
+from e2efly.validation.stress import stress as in_training
 from e2efly.vehicles import load_vehicle
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.stress import stress as in_training
-from e2efly.validation.stress import stress
+from e2efly.validation.plant_stress import stress
+from e2efly.validation.stress import stress as in_training
 from e2efly.vehicles import vehicle_file
 
 ROWS = ("nominal", "mass x1.25", "thrust falls by 15 %", "wind 3 m/s", "delay +20 ms", "motor lag x2")

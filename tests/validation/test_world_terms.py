@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.physics import Physics, State, step
+from e2efly.simulation.physics import Physics, State, step
 from e2efly.validation.world import Body, World
 from e2efly.vehicles import load_vehicle
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.cli import run
+from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.vehicle_file import write_vehicle
+from e2efly.commands.cli import run
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
-from e2efly.env.environment import Env
-from e2efly.identification.estimate import Estimate
-from e2efly.identification.vehicle_file import write_vehicle
+from e2efly.environment.environment import Env
 from e2efly.vehicles import load_vehicle
 from e2efly.vehicles.posterior import WIDEST, load_posterior
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.identification.estimate import Estimate
-from e2efly.identification.vehicle_file import write_vehicle
+from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.vehicle_file import write_vehicle
 from e2efly.vehicles import load_vehicle, vehicle_file
 from e2efly.vehicles.vehicle import read_sigmas
 

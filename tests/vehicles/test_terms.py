@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from e2efly.config import EnvConfig, RewardConfig
-from e2efly.env import Env, EnvState, random_key
-from e2efly.presets import preset
+from e2efly.environment import Env, EnvState, random_key
+from e2efly.runs.presets import preset
 from e2efly.vehicles import load_vehicle, vehicle_file, vehicle_names
 from e2efly.vehicles.terms import BATTERY
 from e2efly.vehicles.vehicle import quantities, read_sigmas, terms

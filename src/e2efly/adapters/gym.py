@@ -14,10 +14,10 @@ from gymnasium.spaces import Box, Dict, Space
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from e2efly.adapters.picture import Chase
+from e2efly.adapters.chase import Chase
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
-from e2efly.sensors.eyes import image_shape
+from e2efly.simulation.sensors.eyes import image_shape
 from e2efly.tasks import TASKS
 
 Observation = np.ndarray | dict[str, np.ndarray]

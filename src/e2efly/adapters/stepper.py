@@ -6,11 +6,11 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly import presets
 from e2efly.config import NetworkConfig, TrainConfig
-from e2efly.device import wide_vectors
-from e2efly.env import Env, EnvState, Step, random_key
-from e2efly.learn.networks import Features, View
+from e2efly.environment import Env, EnvState, Step, random_key
+from e2efly.learning.networks import Features, View
+from e2efly.runs import presets
+from e2efly.simulation.device import wide_vectors
 
 
 def configured(task: str | TrainConfig) -> TrainConfig:

@@ -13,8 +13,8 @@ import torch
 
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
-from e2efly.device import wide_vectors
-from e2efly.env import EnvState, random_key
+from e2efly.environment import EnvState, random_key
+from e2efly.simulation.device import wide_vectors
 
 
 @dataclass(frozen=True)

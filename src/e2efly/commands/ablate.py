@@ -11,12 +11,12 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from e2efly import presets
+from e2efly.commands.terminal import Terminal, TerminalProgress, console_table, markdown
 from e2efly.config import TrainConfig
-from e2efly.config.train import criterion
-from e2efly.device import prepare
-from e2efly.storage import held, write_atomically, write_json
-from e2efly.terminal import Terminal, TerminalProgress, console_table, markdown
+from e2efly.config.run import criterion
+from e2efly.config.storage import held, write_atomically, write_json
+from e2efly.runs import presets
+from e2efly.simulation.device import prepare
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def run(options: Ablate) -> int:
 
 def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
     """Run the ablation in a folder that no other process uses."""
-    from e2efly.view.ablation import Panel, plot_ablation
+    from e2efly.viewing.ablation_plots import Panel, plot_ablation
 
     known = {pair: _known(options, config) for pair, config in configs.items()}
     lines: list[str] = []
@@ -107,7 +107,7 @@ def _config(options: Ablate, task: str, algo: str) -> TrainConfig:
 
 def _vehicles(config: TrainConfig) -> str:
     """The name of what flies."""
-    from e2efly.env import Env
+    from e2efly.environment import Env
 
     return Env.of(config.task, config.reward, config.env).vehicles
 
@@ -118,8 +118,8 @@ def _path(options: Ablate, config: TrainConfig) -> Path:
 
 def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
     """The settings that determine the curves."""
-    from e2efly.learn.checkpoint import FORMAT
-    from e2efly.learn.rundir import to_json
+    from e2efly.learning.checkpoint import FORMAT
+    from e2efly.runs.rundir import to_json
 
     groups = {"by": options.by} if options.by != "term" else {}  # curves by terms that are there already stay
     return {"format": FORMAT, "seeds": options.seeds, "config": to_json(config), **groups}
@@ -127,8 +127,8 @@ def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
 
 def _known(options: Ablate, config: TrainConfig) -> Any:
     """The curves that an earlier run wrote, or None."""
-    from e2efly.learn.ablation import Curves
-    from e2efly.learn.rundir import different_values
+    from e2efly.learning.ablation import Curves
+    from e2efly.runs.rundir import different_values
 
     path = _path(options, config)
     if not path.exists():
@@ -142,8 +142,8 @@ def _known(options: Ablate, config: TrainConfig) -> Any:
 
 def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration and keep their curves."""
-    from e2efly.learn.ablation import Kept, ablate
-    from e2efly.rewards import grouped
+    from e2efly.learning.ablation import Kept, ablate
+    from e2efly.simulation.rewards import grouped
 
     task, algo = config.task.name, config.algo.name
     parts = grouped(config.reward.weights) if options.by == "group" else config.reward.weights
@@ -174,7 +174,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
 
 def _rows(curves: Any, learned: float) -> list[dict[str, str]]:
     """One row per variant: its last evaluation, over all seeds, and when it was learned, at this success, %."""
-    from e2efly.view.ablation import worst
+    from e2efly.viewing.ablation_plots import worst
 
     success, error = worst(curves, False), worst(curves, True)
     reached = [np.flatnonzero(s.mean(axis=0) >= learned) for s in success]

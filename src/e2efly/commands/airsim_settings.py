@@ -7,8 +7,8 @@ from typing import Annotated
 import tyro
 from rich.table import Table
 
-from e2efly.storage import write_json
-from e2efly.terminal import Terminal
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import write_json
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ def run(options: AirsimSettings) -> int:
     Raises:
         ValueError: for an unknown vehicle or policy, or an invalid port. Nothing is written then.
     """
-    from e2efly.deploy.policy.loader import load_policy
-    from e2efly.validation.airsim.settings import named, settings, unsaid
+    from e2efly.policy.loader import load_policy
+    from e2efly.policy.zoo import policy_file
+    from e2efly.validation.airsim.settings_file import named, settings, unsaid
     from e2efly.vehicles import load_vehicle
-    from e2efly.zoo import policy_file
 
     if not 1 <= options.port <= 65535:
         raise ValueError(f"--port is {options.port}; accepted: 1 to 65535")

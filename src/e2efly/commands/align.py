@@ -9,14 +9,14 @@ import numpy as np
 import tyro
 from rich.table import Table
 
-from e2efly.commands.reading import LogOptions, show_notes
-from e2efly.storage import write_json
-from e2efly.terminal import Terminal
+from e2efly.commands.log_options import LogOptions, show_notes
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import write_json
 from e2efly.vehicles import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
-    from e2efly.identification.align import Alignment
-    from e2efly.identification.record import Record
+    from e2efly.alignment.alignment import Alignment
+    from e2efly.logs.recording import Record
 
 THRUST = 0.03
 """Relative difference of the thrust above which it is reported."""
@@ -49,13 +49,13 @@ def run(options: Align) -> int:
     Raises:
         ValueError: naming the log, what is wrong with it and what is accepted. Nothing is written then.
     """
-    from e2efly.device import prepare
-    from e2efly.identification.align import align, refused
-    from e2efly.identification.checks import checked
-    from e2efly.identification.flight import driver_of
-    from e2efly.identification.readers import read_flights
-    from e2efly.identification.vehicle_file import write_vehicle
-    from e2efly.view.alignment import plot_alignment
+    from e2efly.alignment.alignment import align, refused
+    from e2efly.alignment.checks import checked
+    from e2efly.alignment.identification import driver_of
+    from e2efly.alignment.vehicle_file import write_vehicle
+    from e2efly.logs.readers import read_flights
+    from e2efly.simulation.device import prepare
+    from e2efly.viewing.alignment import plot_alignment
 
     began, console = time.perf_counter(), Terminal()
     if not options.logs:
@@ -155,9 +155,9 @@ def _rows(vehicle: Vehicle, found: "Alignment") -> list[dict[str, Any]]:
 
 
 def _report(options: Align, vehicle: Vehicle, found: "Alignment", records: "list[Record]") -> dict[str, Any]:
-    from e2efly.identification.align import refused
-    from e2efly.identification.replay import SIGNALS
-    from e2efly.identification.windows import STEP
+    from e2efly.alignment.alignment import refused
+    from e2efly.alignment.replay import SIGNALS
+    from e2efly.alignment.windows import STEP
 
     windows = found.found.windows.some(found.found.held_out)
     return {
@@ -188,7 +188,7 @@ def _parameters(vehicle: Vehicle, found: "Alignment") -> Table:
 
 
 def _errors(found: "Alignment") -> Table:
-    from e2efly.identification.replay import SIGNALS
+    from e2efly.alignment.replay import SIGNALS
 
     table = Table(
         "error where the fit did not look (rms)", "before", "aligned", box=None, header_style="bold", pad_edge=False

@@ -6,9 +6,9 @@ from typing import Literal
 
 from rich.table import Table
 
-from e2efly.device import cores, prepare, processor
-from e2efly.storage import write_json
-from e2efly.terminal import Terminal
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import write_json
+from e2efly.simulation.device import cores, prepare, processor
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def run(options: Bench) -> int:
 
 def measure() -> dict[str, float]:
     """Steps per second, by kind of step: the best of several runs after compilation."""
-    from e2efly.learn.benchmark import environment_steps, physics_substeps, training_steps
+    from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
 
     return {
         "physics sub-steps, 1024 vehicles": physics_substeps(1024),

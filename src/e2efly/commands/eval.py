@@ -13,15 +13,15 @@ from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.policies import named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
+from e2efly.commands.terminal import Terminal, seconds
 from e2efly.config import EnvConfig, TaskConfig
-from e2efly.config.train import TIMED
-from e2efly.storage import write_json
-from e2efly.terminal import Terminal, seconds
+from e2efly.config.run import TIMED
+from e2efly.config.storage import write_json
+from e2efly.policy.zoo import beside
 from e2efly.vehicles import Controller
-from e2efly.zoo import beside
 
 if TYPE_CHECKING:
-    from e2efly.evaluation import Candidate, Evaluation
+    from e2efly.validation.evaluation import Candidate, Evaluation
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def parse(arguments: list[str]) -> Asked:
     if not given or asks_help(arguments):
         return Asked(parse_options(Eval, "eval", arguments), {}, {})
     found = named_first("eval", arguments, given[0])
-    from e2efly.evaluation import pinned
+    from e2efly.validation.evaluation import pinned
 
     own = pinned(found.env, found.policy)
     empty = dataclasses.replace(own, randomize={})  # a filled dictionary would take no new names
@@ -112,8 +112,8 @@ def run(asked: Asked) -> int:
     check_stress(options.stress, options.rows, options.least)
     if options.stress:
         return _stress(options)
-    from e2efly.evaluation import ROW, evaluate
-    from e2efly.view.evaluation import plot_evaluation
+    from e2efly.validation.evaluation import ROW, evaluate
+    from e2efly.viewing.evaluation_plots import plot_evaluation
 
     o, console = options, Terminal()
     found = evaluate(o.policy, o.episodes, env=asked.env, task=asked.task, **_flies(o), kept=ROW if o.json else 0)
@@ -130,7 +130,7 @@ def run(asked: Asked) -> int:
 
 
 def _stress(o: Eval) -> int:
-    from e2efly.stress import stress
+    from e2efly.validation.stress import stress
 
     found = stress(o.policy, o.episodes, rows=o.rows, **_flies(o))
     return report_stress(found, Terminal(), o.json, _folder(o, found.candidate) / "stress.png", o.least)
@@ -149,7 +149,7 @@ def _folder(o: Eval, flew: "Candidate") -> Path:
 
 def _table(evaluated: "Evaluation", episodes: int) -> Table:
     """Success, then failures by cause, then quality."""
-    from e2efly.episodes import summary
+    from e2efly.environment.episodes import summary
 
     found = {name: summary(e) for name, e in evaluated.flown.items()}
     errs = evaluated.candidate.task.precision not in TIMED  # the distance from the goal is meaningful

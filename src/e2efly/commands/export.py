@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import tyro
 
-from e2efly.c_policy.header import Precision
-from e2efly.device import prepare
-from e2efly.storage import write_atomically
-from e2efly.terminal import Terminal
-from e2efly.zoo import beside, policy_file
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import write_atomically
+from e2efly.policy.c_export.header import Precision
+from e2efly.policy.zoo import beside, policy_file
+from e2efly.simulation.device import prepare
 
 
 @dataclass(frozen=True)
@@ -64,16 +64,16 @@ def run(options: Export) -> int:
         console.print(f"Wrote the zoo's policy {options.run} to {path}")
         return 0
     if options.run.is_file():
-        from e2efly.deploy.policy.loader import sealed_policy
+        from e2efly.policy.loader import sealed_policy
 
         write_atomically(out or options.run, sealed_policy(options.run))
         console.print(f"Wrote {options.run} with its digest to {out or options.run}")
         return 0
     prepare("cpu")
-    from e2efly.learn.export import contract_of, export_policy
-    from e2efly.learn.rundir import RunDirectory
-    from e2efly.learn.runner import load_policy_weights
-    from e2efly.learn.setup import Setup
+    from e2efly.learning.onnx_export import contract_of, export_policy
+    from e2efly.learning.runner import load_policy_weights
+    from e2efly.learning.setup import Setup
+    from e2efly.runs.rundir import RunDirectory
 
     folder = RunDirectory(options.run)
     setup = Setup.of(folder.config())
@@ -88,8 +88,8 @@ def _write_page(options: Export, folder: Path) -> int:
     why = "has no effect with --web: a page flies the policy.onnx that there is"
     _without_effect(options, ("out", "which"), why)
     prepare("cpu")
-    from e2efly.evaluation import candidate
-    from e2efly.web.page import write_page
+    from e2efly.validation.evaluation import candidate
+    from e2efly.viewing.web.page import write_page
 
     found = candidate(options.run, options.vehicle)
     write_page(folder, found)
@@ -100,7 +100,7 @@ def _write_page(options: Export, folder: Path) -> int:
 def _write_c(options: Export, folder: Path) -> int:
     why = "has no effect with --c: the policy.onnx that there is becomes C"
     _without_effect(options, ("out", "which", "web", "vehicle"), why)
-    from e2efly.c_policy.write import write_c
+    from e2efly.policy.c_export.write import write_c
 
     file, name = policy_file(options.run), options.name
     needs = write_c(folder, file, name, options.precision, options.memory, options.flash)

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from e2efly.terminal import Terminal
+from e2efly.commands.terminal import Terminal
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ def run(options: Firmware) -> int:
         OSError: when it cannot be fetched, built or started.
         ValueError: when the archive is not the known one, or when the program is not a known firmware.
     """
-    from e2efly.validation import binary, firmware
+    from e2efly.validation import binary, firmware_program
 
     console = Terminal()
     if options.archive is not None and options.binary is not None:
@@ -32,13 +32,13 @@ def run(options: Firmware) -> int:
     if options.binary is not None:
         with console.status("asking the program for its version"):
             found = binary.keep(options.binary)
-        firmware.choose(found.program.parent)
+        firmware_program.choose(found.program.parent)
         console.print(f"Flown from now on: {options.binary}, kept as {found.program}")
     else:
-        before, began = firmware.built(), time.monotonic()
+        before, began = firmware_program.built(), time.monotonic()
         with console.status(f"fetching and building {firmware.PACKAGE} {firmware.VERSION} (a minute or two, once)"):
-            found = firmware.build(options.archive)
-        firmware.choose(None)
+            found = firmware_program.build(options.archive)
+        firmware_program.choose(None)
         console.print("Built before:" if before else f"Built in {time.monotonic() - began:.0f} s:", found.program)
     release = found.release
     console.print(f"Betaflight {release.name}, MSP {release.api[0]}.{release.api[1]}. "

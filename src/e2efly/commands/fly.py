@@ -15,39 +15,39 @@ import tyro
 from e2efly import __version__
 from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
 from e2efly.commands.options import parse as parse_options
-from e2efly.deploy.betaflight.check import check_hover, examine, hover_schedule
-from e2efly.deploy.betaflight.client import SCHEDULE, Client
-from e2efly.deploy.betaflight.controller import ControllerInfo, identify
-from e2efly.deploy.betaflight.link import Link, open_link
-from e2efly.deploy.betaflight.row import Row, problems
-from e2efly.deploy.betaflight.watchdog import WatchedLink
-from e2efly.deploy.bridge import Bridge
-from e2efly.deploy.commander.commander import Commander, CommandSource
-from e2efly.deploy.commander.sources import open_commands
-from e2efly.deploy.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
-from e2efly.deploy.excitation import NAME as EXCITATION
-from e2efly.deploy.filter.filter import Filter
-from e2efly.deploy.flight_loop import LOWEST_RATE, fly, loop_rate
-from e2efly.deploy.log.live import Live, targets_of
-from e2efly.deploy.log.record import Log, Logs
-from e2efly.deploy.log.telemetry import Telemetry
-from e2efly.deploy.pilot import throttle_map
-from e2efly.deploy.pilot.hovering import DEFAULT, hover_controller
-from e2efly.deploy.policy.loader import Policy, load_policy
-from e2efly.deploy.policy.runtime import Envelope, Runtime, check
-from e2efly.deploy.policy.worker import PolicyWorker
-from e2efly.deploy.pose.sources import open_source
-from e2efly.deploy.service import Service
-from e2efly.deploy.settings import FlightSettings
-from e2efly.deploy.settings import check as check_settings
-from e2efly.deploy.sight.sources import open_cameras
-from e2efly.deploy.terminal import Speaker, Stop
-from e2efly.learn.rundir import run_of
-from e2efly.process import raise_at_interrupt
+from e2efly.commands.terminal import Terminal
+from e2efly.flight.betaflight.client import SCHEDULE, Client
+from e2efly.flight.betaflight.controller import ControllerInfo, identify
+from e2efly.flight.betaflight.link import Link, open_link
+from e2efly.flight.betaflight.row import Row, problems
+from e2efly.flight.betaflight.settings_check import check_hover, examine, hover_schedule
+from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.bridge import Bridge
+from e2efly.flight.commander.commander import Commander, CommandSource
+from e2efly.flight.commander.sources import open_commands
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.flight.excitation import NAME as EXCITATION
+from e2efly.flight.filter.filter import Filter
+from e2efly.flight.flight_loop import LOWEST_RATE, fly, loop_rate
+from e2efly.flight.log_record import Log, Logs
+from e2efly.flight.operator import Speaker, Stop
+from e2efly.flight.pilot import throttle_map
+from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
+from e2efly.flight.pose.sources import open_source
+from e2efly.flight.process import raise_at_interrupt
+from e2efly.flight.publish import Live, targets_of
+from e2efly.flight.service import Service
+from e2efly.flight.settings import FlightSettings
+from e2efly.flight.settings import check as check_settings
+from e2efly.flight.sight.sources import open_cameras
+from e2efly.logs.telemetry import Telemetry
+from e2efly.policy.loader import Policy, load_policy
+from e2efly.policy.runtime import Envelope, Runtime, check
+from e2efly.policy.worker import PolicyWorker
+from e2efly.policy.zoo import policy_file
+from e2efly.runs.rundir import run_of
 from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
-from e2efly.terminal import Terminal
 from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.zoo import policy_file
 
 CONNECT_S = 5.0
 """How long the controller may take to send its first answer, s."""
@@ -56,7 +56,7 @@ SLOWEST = 0.5
 
 
 if TYPE_CHECKING:
-    from e2efly.watch.beside import Shown
+    from e2efly.viewing.watch.beside import Shown
 
 
 @dataclass(frozen=True)
@@ -273,7 +273,7 @@ def _shown(options: Fly, vehicle: str) -> "Shown | None":
     """The page of `--watch`."""
     if options.watch is None:
         return None
-    from e2efly.watch.beside import Shown
+    from e2efly.viewing.watch.beside import Shown
 
     return Shown(options.watch, "--vehicle", vehicle)
 

@@ -10,21 +10,21 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.deploy.betaflight.messages import StatusEx
-from e2efly.deploy.betaflight.row import Row, command_lines, problems
-from e2efly.deploy.bridge import Bridge
-from e2efly.deploy.commander.commander import Commander
-from e2efly.deploy.odometry import Sample
-from e2efly.deploy.pilot.hover import roll_pitch
-from e2efly.deploy.pilot.refusals import take_off_refusals
-from e2efly.deploy.policy.contract import Contract
-from e2efly.deploy.policy.images import Image
-from e2efly.deploy.pose.source import PoseSource
-from e2efly.deploy.sight.picture import blocks, colours, sheet, write_png
-from e2efly.deploy.sight.samples import read_samples
-from e2efly.deploy.sight.source import ImageSource
-from e2efly.deploy.sight.watch import Seen
-from e2efly.process import printable
+from e2efly.flight.betaflight.messages import StatusEx
+from e2efly.flight.betaflight.row import Row, command_lines, problems
+from e2efly.flight.bridge import Bridge
+from e2efly.flight.commander.commander import Commander
+from e2efly.flight.pilot.hover import roll_pitch
+from e2efly.flight.pilot.refusals import take_off_refusals
+from e2efly.flight.pose.pose_source import PoseSource
+from e2efly.flight.process import printable
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.flight.sight.picture import blocks, colours, sheet, write_png
+from e2efly.flight.sight.quality import Seen
+from e2efly.flight.sight.samples import read_samples
+from e2efly.policy.contract import Contract
+from e2efly.policy.images import Image
+from e2efly.policy.odometry import Sample
 
 WIDEST = 10_000
 """The longest line of a table into a file or a pipe."""

@@ -9,7 +9,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.terminal import Terminal
+from e2efly.commands.terminal import Terminal
 
 LONGEST = 20
 """At most this many of the times at which the filter intervened are printed."""
@@ -37,10 +37,10 @@ def run(options: FlyReport) -> int:
     Raises:
         ValueError: for files that cannot be read, or that exist already.
     """
-    from e2efly.deploy.log.bags import export_bag
-    from e2efly.deploy.log.flight_log import read_log
-    from e2efly.view.flight_figures import draw, laid_over
-    from e2efly.view.flight_log import summary
+    from e2efly.logs.bags import export_bag
+    from e2efly.logs.flight_log import read_log
+    from e2efly.viewing.flight_data import summary
+    from e2efly.viewing.flight_figures import draw, laid_over
 
     log = read_log(options.log)
     laid = laid_over(log, options.blackbox) if options.blackbox else None

@@ -15,20 +15,20 @@ import tyro
 
 from e2efly.commands.hil_rehearsal import check_rehearsal, rehearse
 from e2efly.commands.policies import Asked, asked_of
+from e2efly.commands.terminal import Terminal
 from e2efly.config import TaskConfig
+from e2efly.config.storage import write_json
 from e2efly.courses.origin import Origin
-from e2efly.process import be_punctual, raise_at_interrupt
-from e2efly.storage import write_json
+from e2efly.flight.process import be_punctual, raise_at_interrupt
 from e2efly.tasks.route import route_of
-from e2efly.terminal import Terminal
-from e2efly.validation.room import Victim, flags
+from e2efly.validation.processes import Victim, flags
 from e2efly.vehicles import load_vehicle
 
 if TYPE_CHECKING:
-    from e2efly.deploy.child import Child
-    from e2efly.deploy.sight.give import Output
-    from e2efly.validation.hil import Node
+    from e2efly.flight.child import Child
+    from e2efly.flight.sight.outputs import Output
     from e2efly.validation.scenery import Scenery
+    from e2efly.validation.virtual_world import Node
 
 _ROW = "six numbers, room_x,room_y,room_z,x,y,z"
 PRIORITY = 4
@@ -141,15 +141,15 @@ def run(asked: Asked) -> int:
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
     if o.rehearse:
         return rehearse(o, asked.task, origin)
-    from e2efly.deploy.child import Child
-    from e2efly.deploy.pose.sources import open_source
-    from e2efly.deploy.sight.give import give, outputs
-    from e2efly.deploy.sight.record import Recorder
-    from e2efly.deploy.sight.shared import SharedImages
-    from e2efly.device import compute_at_once, prepare
-    from e2efly.evaluation import candidate
-    from e2efly.validation.hil import Node
+    from e2efly.flight.child import Child
+    from e2efly.flight.pose.sources import open_source
+    from e2efly.flight.sight.outputs import give, outputs
+    from e2efly.flight.sight.recorder import Recorder
+    from e2efly.flight.sight.shared import SharedImages
+    from e2efly.simulation.device import compute_at_once, prepare
+    from e2efly.validation.evaluation import candidate
     from e2efly.validation.scenery import Scenery
+    from e2efly.validation.virtual_world import Node
 
     raise_at_interrupt()
     compute_at_once()
@@ -232,7 +232,7 @@ def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Termin
 
 def _watch(node: "Node", o: Hil, other_world: bool, stack: ExitStack, console: Terminal) -> None:
     """Show each pose of the scene on a page, besides what is reported already, and the world if it is the policy's."""
-    from e2efly.watch.beside import Shown
+    from e2efly.viewing.watch.beside import Shown
 
     same = not other_world and o.scene is None
     world = ["--world", str(o.policy), "--seed", str(o.seed)] if same else []
@@ -275,7 +275,7 @@ def _tell(node: "Node", console: Terminal) -> None:
 
 def _report(node: "Node", folder: Path) -> None:
     """The latencies as a picture and as JSON."""
-    from e2efly.view.latency import plot_latencies
+    from e2efly.viewing.latencies import plot_latencies
 
     if len(node.times) < 2:
         return

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.budget import check_time
+from e2efly.commands.terminal import Terminal
+from e2efly.config.budget import check_time
+from e2efly.config.storage import held, write_json
 from e2efly.courses.origin import Origin
-from e2efly.process import raise_at_interrupt
-from e2efly.storage import held, write_json
-from e2efly.terminal import Terminal
+from e2efly.flight.process import raise_at_interrupt
 
 if TYPE_CHECKING:
     from e2efly.commands.hil import Hil
@@ -70,14 +70,14 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     Raises:
         ValueError: naming the option, its value and what is accepted.
     """
-    from e2efly.device import prepare
-    from e2efly.evaluation import candidate
-    from e2efly.validation import firmware
-    from e2efly.validation.hil_rehearsal import Plan, draw
-    from e2efly.validation.hil_rehearsal import rehearse as fly
-    from e2efly.validation.room import flags
+    from e2efly.simulation.device import prepare
+    from e2efly.validation import firmware_program
+    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.processes import flags
+    from e2efly.validation.rehearse_hil import Plan, draw
+    from e2efly.validation.rehearse_hil import rehearse as fly
     from e2efly.validation.scene_files import SceneFile
-    from e2efly.view.hil_rehearsal import plot_lap, plot_times
+    from e2efly.viewing.hil_plots import plot_lap, plot_times
 
     raise_at_interrupt()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight's processes end with this one
@@ -95,7 +95,7 @@ def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
     with held(folder):
         if (report := folder / "report.json").exists():
             raise ValueError(f"--out {folder} holds an earlier rehearsal; accepted: another folder")
-        firmware.chosen()  # built now rather than in a process that is waited for
+        firmware_program.chosen()  # built now rather than in a process that is waited for
         laps = list["Lap"]()
         with console.status("") as status:
             for i in range(o.laps):

@@ -11,18 +11,18 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.reading import LogOptions, show_notes
-from e2efly.storage import held, write_json
-from e2efly.terminal import Terminal
+from e2efly.commands.log_options import LogOptions, show_notes
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import held, write_json
 from e2efly.vehicles import Vehicle, load_vehicle, unknown
 from e2efly.vehicles.posterior import load_posterior
 
 if TYPE_CHECKING:
-    from e2efly.identification.estimate import Estimate
-    from e2efly.identification.flight import Found
-    from e2efly.identification.judge import Prediction
-    from e2efly.identification.readers import Reading
-    from e2efly.identification.record import Record
+    from e2efly.alignment.estimates import Estimate
+    from e2efly.alignment.identification import Found
+    from e2efly.alignment.prediction import Prediction
+    from e2efly.logs.readers import Reading
+    from e2efly.logs.recording import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
 """Kinds of sources, as the command line names them."""
@@ -64,10 +64,11 @@ def run(options: Identify) -> int:
 
 
 def _identify(options: Identify) -> int:
-    from e2efly.identification import csv_file, parts, pendulum, stand, stand_file
-    from e2efly.identification.correlation import correlation
-    from e2efly.identification.estimate import Estimate, fuse
-    from e2efly.identification.vehicle_file import merged, write_vehicle
+    from e2efly.alignment import parts, pendulum, stand, stand_file
+    from e2efly.alignment.correlation import correlation
+    from e2efly.alignment.estimates import Estimate, fuse
+    from e2efly.alignment.vehicle_file import merged, write_vehicle
+    from e2efly.logs import csv_file
 
     began = time.perf_counter()
     files, console = _sources(options.sources), Terminal()
@@ -100,7 +101,7 @@ def _identify(options: Identify) -> int:
             f"{fused['latency'].source}: the vehicle answers {-1e3 * float(fused['latency'].value):.0f} ms before its "
             "commands; accepted: times of both by one clock"
         )
-    from e2efly.identification.judge import judged
+    from e2efly.alignment.prediction import judged
 
     outside = {kind: judged(each) for kind, each in found.items()}
     report = _report(options, base, fused, said, found, outside)
@@ -119,8 +120,8 @@ def _identify(options: Identify) -> int:
             "(--mass KG SIGMA).",
             style="dim",
         )
-    from e2efly.view.identification import plot_identified
-    from e2efly.view.posterior import plot_posterior
+    from e2efly.viewing.identified import plot_identified
+    from e2efly.viewing.uncertainty import plot_posterior
 
     plots = plot_identified(options.out, base, fused, found, outside)
     try:
@@ -155,9 +156,9 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
 
 
 def _records(files: Sequence[Path], reading: "Reading", vehicle: Vehicle, console: Console) -> "list[Record]":
-    from e2efly.identification.blackbox import with_blackboxes
-    from e2efly.identification.checks import checked
-    from e2efly.identification.readers import read_part
+    from e2efly.alignment.checks import checked
+    from e2efly.logs.blackbox_merge import with_blackboxes
+    from e2efly.logs.readers import read_part
 
     read = with_blackboxes([record for path in files for record in read_part(path, reading)])
     show_notes(read, console)
@@ -170,8 +171,8 @@ def _records(files: Sequence[Path], reading: "Reading", vehicle: Vehicle, consol
 
 
 def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", step: bool, console: Console) -> "Found":
-    from e2efly.device import prepare
-    from e2efly.identification.flight import identify
+    from e2efly.alignment.identification import identify
+    from e2efly.simulation.device import prepare
 
     prepare("cpu")
     with console.status("fitting") as status:
@@ -188,7 +189,7 @@ def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list
     """Parameters that are proportional to the mass are not known more precisely than the mass."""
     from dataclasses import replace
 
-    from e2efly.identification.correlation import OVER_MASS
+    from e2efly.alignment.correlation import OVER_MASS
 
     off = _mass_spread(said)
     return [replace(e, sigma=np.hypot(e.sigma, np.abs(e.value) * off)) if e.name in OVER_MASS else e for e in estimates]
@@ -207,8 +208,8 @@ def _report(
     found: "dict[str, Found]",
     outside: "dict[str, Prediction]",
 ) -> dict[str, Any]:
-    from e2efly.identification.flight import nuisances
-    from e2efly.identification.windows import STEP
+    from e2efly.alignment.identification import nuisances
+    from e2efly.alignment.windows import STEP
 
     def entry(e: "Estimate") -> dict[str, Any]:
         return {"value": e.value.tolist(), "sigma": e.sigma.tolist(), "source": e.source}
@@ -254,7 +255,7 @@ def _report(
 
 
 def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
-    from e2efly.identification.record import percent
+    from e2efly.logs.recording import percent
 
     table = Table("parameter", "file", "identified", "sigma", "source", box=None, header_style="bold", pad_edge=False)
     for name, e in fused.items():

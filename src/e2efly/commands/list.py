@@ -6,15 +6,16 @@ from typing import Annotated, Any
 
 import tyro
 
-from e2efly import presets, zoo
+from e2efly.commands.terminal import Terminal, console_table
 from e2efly.config import ALGORITHMS
+from e2efly.config.names import unknown
+from e2efly.config.registry import load_installed
 from e2efly.courses.tracks import track_names
-from e2efly.device import prepare
-from e2efly.registry import load_installed
+from e2efly.policy import zoo
+from e2efly.runs import presets
+from e2efly.simulation.device import prepare
 from e2efly.tasks import TASKS
-from e2efly.terminal import Terminal, console_table
 from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_names
-from e2efly.vehicles.names import unknown
 
 Rows = list[dict[str, Any]]
 
@@ -101,22 +102,22 @@ def _zoo() -> Rows:
 
 
 def _rewards() -> Rows:
-    from e2efly.rewards import TERMS
+    from e2efly.simulation.rewards import TERMS
 
     rows = _described("reward term", ((name, term.function) for name, term in TERMS.items()))
     return [row | {"gradient": TERMS[row["reward term"]].kind} for row in rows]
 
 
 def _scenes() -> Rows:
-    from e2efly.scenes.meshes.load import FORMATS, mesh_scene_names
-    from e2efly.view.places import GENERATED
+    from e2efly.simulation.scenes.meshes.load import FORMATS, mesh_scene_names
+    from e2efly.viewing.places import GENERATED
 
     kinds = {"random": GENERATED, "race track": track_names(), "mesh": mesh_scene_names(), "file": (".toml", *FORMATS)}
     return [{"scene": name, "kind": kind} for kind, names in kinds.items() for name in names]
 
 
 def _cameras() -> Rows:
-    from e2efly.scenes.camera import PRESETS
+    from e2efly.simulation.scenes.camera import PRESETS
 
     return [
         {"camera": name, "image": c.sees, "columns x rows": f"{c.width} x {c.height}", "projection": c.projection}
@@ -126,8 +127,8 @@ def _cameras() -> Rows:
 
 def _rest() -> Rows:
     from e2efly.control import COMMAND_MODES
-    from e2efly.deploy.pilot.hovering import HOVERS
-    from e2efly.physics import INTEGRATORS
+    from e2efly.flight.pilot.hovering import HOVERS
+    from e2efly.simulation.physics import INTEGRATORS
     from e2efly.tasks.race import ANY
     from e2efly.validation.plants import PLANTS
 

@@ -8,8 +8,8 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.evaluation import Candidate
-from e2efly.validation import firmware
+from e2efly.validation import firmware_program
+from e2efly.validation.evaluation import Candidate
 from e2efly.validation.rehearsal import Rehearsal, rehearse
 from e2efly.validation.scenery import Scenery
 from e2efly.vehicles import Vehicle
@@ -26,7 +26,7 @@ def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, 
     """
     suite = next(iter(found.task.criteria().values()))
     env = found.environment(suite) if found.policy.contract.images else None
-    built, flights = firmware.chosen(), []
+    built, flights = firmware_program.chosen(), []
     with console.status("whole flights through the firmware") as status:
         for i in range(count):
             status.update(f"whole flight {i + 1} of {count} through the firmware")

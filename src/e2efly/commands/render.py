@@ -9,12 +9,12 @@ import numpy as np
 import tyro
 from rich.progress import track
 
+from e2efly.commands.terminal import Terminal
+from e2efly.config.names import unknown
 from e2efly.control import Quat
 from e2efly.courses.references import read_csv, through_points
-from e2efly.device import prepare
-from e2efly.terminal import Terminal
-from e2efly.vehicles.names import unknown
-from e2efly.zoo import beside, is_policy, names, policy_file
+from e2efly.policy.zoo import beside, is_policy, names, policy_file
+from e2efly.simulation.device import prepare
 
 PERIOD = 0.05
 """Seconds between the frames of a video."""
@@ -75,13 +75,13 @@ def run(options: Render) -> int:
     if is_policy(options.scene):
         return _policy(options)
     prepare()
-    from e2efly.env import random_key
-    from e2efly.scenes.camera import PRESETS
-    from e2efly.view.cloud import write_cloud
-    from e2efly.view.images import look_around, sized, write_pictures
-    from e2efly.view.places import find_place, place_names
-    from e2efly.view.sheet import write_sheet
-    from e2efly.view.video import exposure_of, frames, write_video
+    from e2efly.environment import random_key
+    from e2efly.simulation.scenes.camera import PRESETS
+    from e2efly.viewing.cloud import write_cloud
+    from e2efly.viewing.image_plots import look_around, sized, write_pictures
+    from e2efly.viewing.places import find_place, place_names
+    from e2efly.viewing.sheet import write_sheet
+    from e2efly.viewing.video import exposure_of, frames, write_video
 
     console = Terminal()
     if options.scene not in place_names() and not Path(options.scene).suffix:
@@ -136,7 +136,7 @@ def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _tour(options: Render, place: Any) -> Any:
-    from e2efly.view.tour import Tour, plan
+    from e2efly.viewing.tour import Tour, plan
 
     if options.flight is None:
         return plan(place.clearance, place.route, place.straight, PERIOD)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.storage import write_json
-from e2efly.terminal import seconds
+from e2efly.commands.terminal import seconds
+from e2efly.config.storage import write_json
 
 if TYPE_CHECKING:
-    from e2efly.stress import Report
+    from e2efly.validation.stress import Report
 
 
 def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> None:
@@ -26,7 +26,7 @@ def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> No
         return
     if least is not None and not 0 <= least <= 1:  # true for NaN
         raise ValueError(f"--least is {least}; accepted: 0 to 1")
-    from e2efly.env.stress import check_rows
+    from e2efly.environment.stress_rows import check_rows
 
     check_rows(rows)
 
@@ -44,7 +44,7 @@ def report_stress(found: "Report", console: Console, json: Path | None, plot: Pa
     Returns:
         0, or 1 when a row succeeds less often than `least`.
     """
-    from e2efly.view.stress import plot_stress
+    from e2efly.viewing.stress_plot import plot_stress
 
     for note in found.candidate.notes:
         console.print(note, style="dim")
@@ -66,7 +66,7 @@ def report_stress(found: "Report", console: Console, json: Path | None, plot: Pa
 
 
 def _table(found: "Report") -> Table:
-    from e2efly.episodes import summary
+    from e2efly.environment.episodes import summary
 
     count = next(len(e.success) for criteria in found.flown.values() for e in criteria.values())
     headings = f"of {count} starts", "success", "95 % interval", "final error", "time"

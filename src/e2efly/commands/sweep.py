@@ -22,15 +22,15 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from e2efly import presets
-from e2efly.budget import check_time
 from e2efly.commands import train
+from e2efly.commands.terminal import Terminal, console_table, markdown
 from e2efly.config import ALGORITHMS, TrainConfig
-from e2efly.device import cores
-from e2efly.learn.rundir import RunDirectory
-from e2efly.storage import held, write_atomically, write_json
+from e2efly.config.budget import check_time
+from e2efly.config.storage import held, write_atomically, write_json
+from e2efly.runs import presets
+from e2efly.runs.rundir import RunDirectory
+from e2efly.simulation.device import cores
 from e2efly.tasks import TASKS
-from e2efly.terminal import Terminal, console_table, markdown
 
 RUN_S = 5.0
 """Minimum duration of a run, s; on one core alone."""
@@ -123,7 +123,7 @@ def run(options: Sweep) -> int:
 
 def _sweep(options: Sweep, trials: list[Trial], console: Console) -> int:
     """Run the sweep in a folder that no other process uses."""
-    from e2efly.learn.judge import rates
+    from e2efly.learning.judge import rates
 
     found = {trial.out: summary for trial in trials if (summary := trial.ended())}
     console.print(
@@ -251,7 +251,7 @@ def _each(success: list[dict[str, float]], of: Callable[[list[float]], Any]) -> 
 
 def _report(options: Sweep, trials: list[Trial], found: dict[Path, dict[str, Any]], console: Console) -> None:
     """One row per variant, and a file with every run."""
-    from e2efly.learn.judge import rates
+    from e2efly.learning.judge import rates
 
     rows = []
     for variant in dict.fromkeys(trial.variant for trial in trials):

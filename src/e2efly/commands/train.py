@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 from rich.console import Console
 
-from e2efly import presets
 from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.options import peek
+from e2efly.commands.terminal import Terminal, TerminalProgress, console_table, seconds
 from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
-from e2efly.config.train import TIMED
-from e2efly.device import Hosts, prepare
-from e2efly.supervised import is_watched, watched
+from e2efly.config.run import TIMED
+from e2efly.learning.supervised import is_watched, watched
+from e2efly.runs import presets
+from e2efly.simulation.device import Hosts, prepare
 from e2efly.tasks import TASKS
-from e2efly.terminal import Terminal, TerminalProgress, console_table, seconds
 from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
 
 if TYPE_CHECKING:
-    from e2efly.watch.beside import Beside
+    from e2efly.viewing.watch.beside import Beside
 
 _FLOWN = {"nominal": "best", "stress": "best", "shipped": "best", "last": "last"}
 """Parts of a summary that hold evaluations of a policy, and whether it is the best or the last."""
@@ -69,7 +69,7 @@ def run(options: Train) -> int:
     if o.hosts.count > 1 and not is_watched():
         return watched([sys.executable, "-m", "e2efly", "train", *o.arguments], lambda reason: f"{reason}; {again}")
     prepare(o.device, o.hosts)
-    from e2efly.learn.hosts import LostHostError
+    from e2efly.learning.hosts import LostHostError
 
     try:
         return _train(o, again, Terminal(quiet=o.hosts.index > 0))
@@ -86,7 +86,7 @@ def parse(arguments: list[str]) -> Train:
     Raises:
         ValueError: for unknown names, for options that contradict each other, and for a run that does not exist.
     """
-    from e2efly.learn.rundir import run_folder
+    from e2efly.runs.rundir import run_folder
 
     parsed, config = _parsed(arguments)
     if parsed.resume and parsed.overwrite:
@@ -107,9 +107,9 @@ def _again(o: Train) -> str:
 
 
 def _train(o: Train, again: str, console: Console) -> int:
-    from e2efly.learn.programs import traced_folder
-    from e2efly.learn.rundir import RunDirectory
-    from e2efly.learn.runner import train
+    from e2efly.learning.programs import traced_folder
+    from e2efly.learning.runner import train
+    from e2efly.runs.rundir import RunDirectory
 
     page = _page(o)
     if o.resume and not RunDirectory(o.out).checkpoint.exists():
@@ -134,7 +134,7 @@ def _page(o: Train) -> "Beside | None":
     """The page of `--watch`."""
     if o.watch is None or o.hosts.index > 0:
         return None
-    from e2efly.watch.beside import Beside
+    from e2efly.viewing.watch.beside import Beside
 
     return Beside(o.watch, str(o.out))
 
@@ -152,14 +152,14 @@ class _Shown(TerminalProgress):
 
 
 def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:
-    from e2efly.learn.clock import since_process_start
+    from e2efly.learning.usage import since_process_start
 
     _report(console, summary, o)
     if summary["stopped_by_user"]:
         console.print(f"Stopped; {again}")
         return 130
     if o.plots and not console.quiet:
-        from e2efly.view.evaluation import plot_run
+        from e2efly.viewing.evaluation_plots import plot_run
 
         with console.status("Drawing plots"):
             plot_run(o.out, *progress.end)
@@ -170,7 +170,7 @@ def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progr
 
 
 def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
-    from e2efly.learn.judge import verdict
+    from e2efly.learning.judge import verdict
 
     rows = [
         {
@@ -332,7 +332,7 @@ def _with_folder(arguments: list[str]) -> list[str]:
 
 def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
     """The same as `_parsed`, for a run that continues and no named task: everything comes from the run."""
-    from e2efly.learn.rundir import RunDirectory
+    from e2efly.runs.rundir import RunDirectory
 
     out = peek(arguments, "--out", "")
     if not out:

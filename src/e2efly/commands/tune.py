@@ -10,10 +10,10 @@ import tyro
 from e2efly.commands import eval as evaluation
 from e2efly.commands import identify, train
 from e2efly.commands.identify import Identify
-from e2efly.commands.reading import LogOptions
-from e2efly.storage import held, write_atomically, write_json
+from e2efly.commands.log_options import LogOptions
+from e2efly.commands.terminal import Terminal
+from e2efly.config.storage import held, write_atomically, write_json
 from e2efly.tasks import TASKS
-from e2efly.terminal import Terminal
 from e2efly.vehicles.posterior import IDENTIFIED
 
 

@@ -12,18 +12,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from e2efly.budget import check_time
 from e2efly.commands.policies import Asked, asked_of
 from e2efly.commands.rows import check_stress, report_stress
+from e2efly.commands.terminal import Terminal, seconds
 from e2efly.config import TaskConfig
-from e2efly.storage import write_atomically, write_json
-from e2efly.terminal import Terminal, seconds
+from e2efly.config.budget import check_time
+from e2efly.config.storage import write_atomically, write_json
+from e2efly.policy.zoo import beside
 from e2efly.vehicles import Controller
-from e2efly.zoo import beside
 
 if TYPE_CHECKING:
-    from e2efly.evaluation import Candidate
-    from e2efly.validation.validate import Validation
+    from e2efly.validation.evaluation import Candidate
+    from e2efly.validation.plant_validation import Validation
 
 WHOLE_S = 1.0
 """Minimum duration of a whole flight with the firmware, s."""
@@ -103,9 +103,9 @@ def run(asked: Asked) -> int:
     check_stress(options.stress, options.rows, options.least)
     if options.stress:
         return _stress(options)
-    from e2efly.validation.validate import validate
-    from e2efly.view.kept import flights_file, packed
-    from e2efly.view.validation import flown_again, plot_validation
+    from e2efly.validation.plant_validation import validate
+    from e2efly.viewing.kept import flights_file, packed
+    from e2efly.viewing.validation import flown_again, plot_validation
 
     o, console = options, Terminal()
     if o.flights < 0:
@@ -149,7 +149,7 @@ def run(asked: Asked) -> int:
 
 
 def _stress(o: Validate) -> int:
-    from e2efly.validation.stress import FLIGHTS, stress
+    from e2efly.validation.plant_stress import FLIGHTS, stress
 
     if o.log:
         raise ValueError(f"--log is {o.log}; accepted without --stress")
@@ -207,7 +207,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
 
 
 def _table(found: "Validation") -> Table:
-    from e2efly.episodes import summary
+    from e2efly.environment.episodes import summary
 
     headings = "criterion", "flown in", "success", "95 %", "end error", "mean", "time", "drop"
     table = Table(*headings, box=None, header_style="bold", pad_edge=False)

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 import tyro
 
-from e2efly.process import be_idle
-from e2efly.terminal import Terminal
-from e2efly.zoo import policy_file
+from e2efly.commands.terminal import Terminal
+from e2efly.flight.process import be_idle
+from e2efly.policy.zoo import policy_file
 
 if TYPE_CHECKING:
-    from e2efly.watch.frames import Source
-    from e2efly.watch.recording import Recording
-    from e2efly.watch.report import Shown
-    from e2efly.watch.simulation import Simulation
-    from e2efly.watch.training import Progress
+    from e2efly.viewing.watch.recording import Recording
+    from e2efly.viewing.watch.report import Shown
+    from e2efly.viewing.watch.simulation import Simulation
+    from e2efly.viewing.watch.stage import Source
+    from e2efly.viewing.watch.training import Progress
 
 MOST = 1024
 """Largest number of vehicles."""
@@ -95,11 +95,11 @@ def run(options: Watch) -> int:
     if o.video is not None:
         return _draw(o, o.video, logs, console)
     if o.idle:
-        from e2efly.watch.waiting import asked_for
+        from e2efly.viewing.watch.waiting import asked_for
 
         if not asked_for(o.host, o.port, _abandoned):
             return 0
-    from e2efly.watch.viewer import serve
+    from e2efly.viewing.watch.viewer import serve
 
     server = serve(o.host, o.port, f"e2efly watch {' '.join(o.what)}")
 
@@ -117,7 +117,7 @@ def run(options: Watch) -> int:
 
 def _logs(what: Sequence[str], vehicle: str | None) -> list[Path]:
     """The flight logs, if flight logs are to be watched; otherwise none."""
-    from e2efly.identification.readers import is_log
+    from e2efly.logs.readers import is_log
 
     logs = [Path(text) for text in what if is_log(Path(text))]
     if len(what) > 1 and len(logs) < len(what):
@@ -132,9 +132,9 @@ def _logs(what: Sequence[str], vehicle: str | None) -> list[Path]:
 
 def _serve(o: Watch, server: Any, logs: list[Path], ready: Callable[[], None]) -> None:
     """Show what is asked for, and call `ready` once it is known to exist."""
-    from e2efly.watch.loop import run as loop
-    from e2efly.watch.panels import Panel, hands_on, policies_on, starts_on, times_on
-    from e2efly.watch.viewer import Viewer
+    from e2efly.viewing.watch.loop import run as loop
+    from e2efly.viewing.watch.panels import Panel, hands_on, policies_on, starts_on, times_on
+    from e2efly.viewing.watch.viewer import Viewer
 
     end = time.monotonic() + (np.inf if o.seconds is None else o.seconds)
 
@@ -178,7 +178,7 @@ def _abandoned() -> bool:
 
 def _is_source(text: str) -> bool:
     """Whether the argument names a pose source and nothing else."""
-    from e2efly.deploy.pose.sources import SOURCES
+    from e2efly.flight.pose.sources import SOURCES
 
     return text.partition(":")[0] in SOURCES and ":" in text
 
@@ -186,18 +186,18 @@ def _is_source(text: str) -> bool:
 @contextmanager
 def _poses(o: Watch) -> "Iterator[Any]":
     """A vehicle at the poses of a pose source."""
-    from e2efly.deploy.pose.sources import open_source
-    from e2efly.scenes.faces import bodies
+    from e2efly.flight.pose.sources import open_source
+    from e2efly.simulation.scenes.faces import bodies
     from e2efly.vehicles import load_vehicle
-    from e2efly.watch.poses import Poses
+    from e2efly.viewing.watch.poses import Poses
 
     stands = ()
     if o.world is not None:
-        from e2efly.device import prepare
+        from e2efly.simulation.device import prepare
 
         prepare("cpu")
-        from e2efly.evaluation import candidate
-        from e2efly.scenes.scene import Scene
+        from e2efly.simulation.scenes.scene import Scene
+        from e2efly.validation.evaluation import candidate
         from e2efly.validation.scenery import Scenery
 
         found = candidate(o.world, o.vehicle)
@@ -213,8 +213,8 @@ def _poses(o: Watch) -> "Iterator[Any]":
 
 
 def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
-    from e2efly.view.video import check_film, write_film
-    from e2efly.watch.film import film
+    from e2efly.viewing.video import check_film, write_film
+    from e2efly.viewing.watch.film import film
 
     check_film(path)
     if _is_source(o.what[0]):
@@ -236,7 +236,7 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
 
 def _recording(o: Watch, logs: list[Path]) -> Any:
     from e2efly.vehicles import load_vehicle
-    from e2efly.watch.recording import Recording, read_flight, vehicle_of
+    from e2efly.viewing.watch.recording import Recording, read_flight, vehicle_of
 
     vehicle = load_vehicle(o.vehicle) if o.vehicle else vehicle_of(logs[0]) or load_vehicle(USUAL)
     return Recording([read_flight(path, vehicle) for path in logs], vehicle)
@@ -247,10 +247,10 @@ def _report(what: tuple[str, ...]) -> Path | None:
     path = Path(what[0])
     if path.suffix != ".json" and not path.is_dir():
         return None
-    from e2efly.device import prepare
+    from e2efly.simulation.device import prepare
 
     prepare("cpu")
-    from e2efly.watch.report import report_of
+    from e2efly.viewing.watch.report import report_of
 
     return report_of(path)
 
@@ -259,8 +259,8 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
     """The first start of a report in the requested criterion, and all starts."""
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
-    from e2efly.watch.recording import Recording
-    from e2efly.watch.report import read_report
+    from e2efly.viewing.watch.recording import Recording
+    from e2efly.viewing.watch.report import read_report
 
     starts, vehicle = read_report(report)
     criterion = _criterion(o.criterion, dict.fromkeys(start.criterion for start in starts))
@@ -271,16 +271,16 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
 
 def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
     """The simulation of a policy, and the progress of its run if it belongs to one."""
-    from e2efly.device import prepare
+    from e2efly.simulation.device import prepare
 
     prepare("cpu")
-    from e2efly.evaluation import act_of, candidate
-    from e2efly.learn.rundir import RunDirectory
-    from e2efly.watch.simulation import Simulation
+    from e2efly.runs.rundir import RunDirectory
+    from e2efly.validation.evaluation import act_of, candidate
+    from e2efly.viewing.watch.simulation import Simulation
 
     what = Path(o.what[0])
     if (what / "config.json").is_file() and o.vehicle is None:
-        from e2efly.watch.training import of_run
+        from e2efly.viewing.watch.training import of_run
 
         progress = of_run(RunDirectory(what))
         if not progress.wait(0):

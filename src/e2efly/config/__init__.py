@@ -13,16 +13,7 @@ from e2efly.config.algorithms import (
     PPOConfig,
     SHACConfig,
 )
-from e2efly.config.train import (
-    NetworkConfig,
-    Paper,
-    RewardConfig,
-    Robust,
-    StageConfig,
-    TaskConfig,
-    TrainConfig,
-)
-from e2efly.config.vehicle import (
+from e2efly.config.env import (
     D435I,
     CameraConfig,
     DisturbanceConfig,
@@ -31,8 +22,17 @@ from e2efly.config.vehicle import (
     ImuConfig,
     NoiseConfig,
 )
-from e2efly.config.worlds import CLUTTER, ClutterConfig, ForestConfig
-from e2efly.numbers import check_fields, number, shape
+from e2efly.config.numbers import check_fields, number, shape
+from e2efly.config.random_worlds import CLUTTER, ClutterConfig, ForestConfig
+from e2efly.config.run import (
+    NetworkConfig,
+    Paper,
+    RewardConfig,
+    Robust,
+    StageConfig,
+    TaskConfig,
+    TrainConfig,
+)
 
 __all__ = [
     "ALGORITHMS",

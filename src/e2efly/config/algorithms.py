@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from e2efly.numbers import check_fields, number
-from e2efly.registry import Registry
+from e2efly.config.numbers import check_fields, number
+from e2efly.config.registry import Registry
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class AlgorithmConfig:
     name: ClassVar[str] = ""
     """The name under which it is registered."""
     program: ClassVar[Any] = ""
-    """The class of `e2efly.learn.algorithm.Algorithm` that learns, or its reference: `package.module:Name`."""
+    """The class of `e2efly.learning.algorithm.Algorithm` that learns, or its reference: `package.module:Name`."""
     like: ClassVar[str] = "ppo"
     """The algorithm whose rewards it uses for tasks that have none for it: ppo or bptt."""
     exact: ClassVar[bool] = False
@@ -134,7 +134,7 @@ class _Proximal(AlgorithmConfig):
 class PPOConfig(_Proximal):
     """Proximal policy optimisation (Schulman et al. 2017)."""
 
-    program: ClassVar = "e2efly.learn.ppo:PPO"
+    program: ClassVar = "e2efly.learning.ppo:PPO"
 
     gamma: float = number(0.96, above=0, high=1)
     """Discount per step."""
@@ -145,7 +145,7 @@ class PPOConfig(_Proximal):
 class BPTTConfig(_FirstOrder):
     """Back-propagation through time: the exact gradient of the return through physics and policy."""
 
-    program: ClassVar = "e2efly.learn.bptt:BPTT"
+    program: ClassVar = "e2efly.learning.bptt:BPTT"
 
     learning_rate: float = number(4e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
@@ -163,7 +163,7 @@ class BPTTConfig(_FirstOrder):
 class SHACConfig(_FirstOrder):
     """Short-horizon actor-critic (Xu et al. 2022): the exact gradient over a window, and a critic's value beyond it."""
 
-    program: ClassVar = "e2efly.learn.shac:SHAC"
+    program: ClassVar = "e2efly.learning.shac:SHAC"
 
     horizon: int = number(32, above=0)
     """Steps of a window (sets shapes)."""
@@ -199,7 +199,7 @@ class ABPTConfig(_FirstOrder):
     learn from a replay buffer.
     """
 
-    program: ClassVar = "e2efly.learn.abpt:ABPT"
+    program: ClassVar = "e2efly.learning.abpt:ABPT"
 
     horizon: int = number(32, above=0)
     """Steps of a window (sets shapes)."""
@@ -259,7 +259,7 @@ class ABPTConfig(_FirstOrder):
 class FOPPOConfig(_Proximal, _FirstOrder):
     """PPO refined by first-order gradients: epochs over a rollout, then a step along its exact gradient. Our method."""
 
-    program: ClassVar = "e2efly.learn.foppo:FOPPO"
+    program: ClassVar = "e2efly.learning.foppo:FOPPO"
 
     horizon: int = number(32, above=0)
     """Steps of a rollout. The rollout is also the window of the exact gradient (sets shapes)."""

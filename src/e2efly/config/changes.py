@@ -4,8 +4,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from e2efly.config.names import unknown
 from e2efly.config.reading import read
-from e2efly.vehicles.names import unknown
 
 T = TypeVar("T")
 

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.courses.domain import FIRST, Domain, Extent
+from e2efly.config.domain import FIRST, Domain, Extent
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
 FEWEST, MOST = 3, 12

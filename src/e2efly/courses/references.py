@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.courses.domain import Domain, Extent
-from e2efly.vehicles.tables import LARGEST, shown
+from e2efly.config.domain import Domain, Extent
+from e2efly.config.tables import LARGEST, shown
 
 KNOT_PERIOD = 0.5
 """Time between the knots of all references except the user's own, s."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from e2efly.config import TaskConfig
-from e2efly.registry import Registry
+from e2efly.config.registry import Registry
 
 TASKS: Registry[type[TaskConfig]] = Registry("task")
 """The classes of task options."""

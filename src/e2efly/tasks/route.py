@@ -9,16 +9,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import TaskConfig, check_fields, number
+from e2efly.config.domain import Domain
+from e2efly.config.registry import load
+from e2efly.config.tables import LARGEST
 from e2efly.control import COMMAND_MODES
-from e2efly.courses.domain import Domain
 from e2efly.courses.origin import Origin
-from e2efly.deploy.policy.contract import Contract
-from e2efly.goal import Course, Goal, Shape
-from e2efly.observation import Field
-from e2efly.registry import load
+from e2efly.policy.contract import Contract
+from e2efly.policy.goal import Course, Goal, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.registry import TASKS
 from e2efly.vehicles import Vehicle
-from e2efly.vehicles.tables import LARGEST
 
 UNDECLARED = "The policy does not say for which courses it was trained."
 ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"

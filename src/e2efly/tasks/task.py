@@ -9,12 +9,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import TaskConfig
-from e2efly.goal import Outcome, Shape
-from e2efly.numbers import SHAPE
-from e2efly.observation import Field
-from e2efly.physics import State
-from e2efly.registry import check_methods, load
-from e2efly.scenes.scene import Scene, gaps
+from e2efly.config.numbers import SHAPE
+from e2efly.config.registry import check_methods, load
+from e2efly.policy.goal import Outcome, Shape
+from e2efly.policy.observation import Field
+from e2efly.simulation.physics import State
+from e2efly.simulation.scenes.scene import Scene, gaps
 from e2efly.tasks.registry import TASKS
 
 jax.tree_util.register_dataclass(Shape)

@@ -6,7 +6,7 @@ They use the library of their arrays, NumPy or JAX, so that flight and training 
 from typing import Any
 
 from e2efly.control.vectors import Array, Quat, Vec3, namespace
-from e2efly.goal import Shape
+from e2efly.policy.goal import Shape
 
 
 def distance(a: Array, b: Array) -> Array:

@@ -10,20 +10,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from e2efly.baseline import Baseline, acting
-from e2efly.deploy.policy.loader import Policy, load_policy
-from e2efly.deploy.policy.runtime import Runtime
-from e2efly.device import compute_at_once, cores, prepare
-from e2efly.goal import Course
+from e2efly.policy.goal import Course
+from e2efly.policy.loader import Policy, load_policy
+from e2efly.policy.runtime import Runtime
+from e2efly.simulation.device import compute_at_once, cores, prepare
 from e2efly.tasks import TASKS
-from e2efly.validation.flight import Trajectory, fly
+from e2efly.validation.baseline import Baseline, acting
 from e2efly.validation.plant import Plant, RigidState
+from e2efly.validation.plant_flight import Trajectory, fly
 from e2efly.validation.plants import find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.vehicles import Vehicle
 
 if TYPE_CHECKING:
-    from e2efly.validation.sight import Sight
+    from e2efly.validation.plant_sight import Sight
 
 WORTH = 20
 """Number of flights below which separate processes are not worth the second that they take to start."""

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.log.flight_log import FlightLog, read_log
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.pilot.flight_state import Reason
-from e2efly.goal import Course
-from e2efly.validation.room import Victim
+from e2efly.flight.pilot.flight_state import Reason
+from e2efly.logs.flight_log import FlightLog, read_log
+from e2efly.policy.goal import Course
+from e2efly.policy.odometry import Odometry
+from e2efly.validation.processes import Victim
 from e2efly.validation.room_process import RECORDED
 from e2efly.validation.scenery import Scenery
 

@@ -16,7 +16,7 @@ import sys
 import time
 from collections import deque
 
-from e2efly.process import be_punctual
+from e2efly.flight.process import be_punctual
 
 PRIORITY = 8
 """Real-time priority, below that of the bridge."""

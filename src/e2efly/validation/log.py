@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.control import Quat, Vec3
-from e2efly.identification.record import Record, Stream
-from e2efly.validation.flight import Trajectory
+from e2efly.logs.recording import Record, Stream
 from e2efly.validation.plant import RigidState
+from e2efly.validation.plant_flight import Trajectory
 from e2efly.vehicles.vehicle import GRAVITY
 
 SAMPLE = 0.004

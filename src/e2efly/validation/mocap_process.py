@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.process import be_punctual
+from e2efly.flight.process import be_punctual
 
 DELAY_S = 0.004
 """Delay of cameras and network, s."""

@@ -14,11 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from e2efly.env import UNSEEN, Env, random_key
-from e2efly.env.state import EnvState
-from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import Scene
-from e2efly.sensors.eyes import Eye
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.env_state import EnvState
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
+from e2efly.simulation.scenes.scene import Scene
+from e2efly.simulation.sensors.eyes import Eye
 from e2efly.validation.plant import RigidState
 
 

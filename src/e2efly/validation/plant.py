@@ -12,8 +12,8 @@ from typing import ClassVar, Self
 import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.deploy.odometry import Odometry
-from e2efly.deploy.policy.contract import Contract
+from e2efly.policy.contract import Contract
+from e2efly.policy.odometry import Odometry
 from e2efly.vehicles import Vehicle, unknown
 from e2efly.vehicles.vehicle import quantities, terms
 

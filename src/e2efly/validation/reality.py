@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.control import Quat
-from e2efly.deploy.odometry import Odometry
+from e2efly.policy.odometry import Odometry
 from e2efly.validation.plant import Plant
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import quantities, terms

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.log.record import Log
-from e2efly.deploy.pilot.flight_state import Mode, Reason
-from e2efly.deploy.policy.runtime import Acting, RuntimeState
-from e2efly.deploy.sight.source import ImageSource
-from e2efly.goal import Course, Outcome
+from e2efly.flight.log_record import Log
+from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.policy.goal import Course, Outcome
+from e2efly.policy.runtime import Acting, RuntimeState
 from e2efly.tasks.route import course_for, route_of
-from e2efly.validation.firmware import Firmware
+from e2efly.validation.bridge_session import Flown, Session, rehearsal_settings
+from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
-from e2efly.validation.session import Flown, Session, rehearsal_settings
 from e2efly.vehicles.vehicle import Vehicle
 
 PARKED = 0.3

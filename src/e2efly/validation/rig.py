@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.deploy.odometry import Sample
-from e2efly.device import compute_at_once, one_core
-from e2efly.validation.firmware import Firmware
+from e2efly.policy.odometry import Sample
+from e2efly.simulation.device import compute_at_once, one_core
+from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.sitl import FirmwareState, Sitl
 from e2efly.validation.world import Body, World
 from e2efly.vehicles.vehicle import Vehicle

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.odometry import tilt_of, yaw_of
-from e2efly.process import be_punctual
-from e2efly.validation.firmware import chosen
+from e2efly.flight.process import be_punctual
+from e2efly.policy.odometry import tilt_of, yaw_of
+from e2efly.validation.firmware_program import chosen
 from e2efly.validation.rig import POSE_NOISE, Rig, Transmitter
 from e2efly.vehicles import load_vehicle
 

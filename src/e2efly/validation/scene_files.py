@@ -12,13 +12,13 @@ import numpy as np
 
 from e2efly.config import CameraConfig
 from e2efly.courses.origin import Origin
-from e2efly.scenes.camera import look, mount
-from e2efly.scenes.file import load_scene
-from e2efly.scenes.mesh import parts
-from e2efly.scenes.meshes.load import FORMATS, load_mesh_scene
-from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import Scene, join
-from e2efly.scenes.shapes import FAR
+from e2efly.simulation.scenes.camera import look, mount
+from e2efly.simulation.scenes.file import load_scene
+from e2efly.simulation.scenes.mesh import parts
+from e2efly.simulation.scenes.meshes.load import FORMATS, load_mesh_scene
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
+from e2efly.simulation.scenes.scene import Scene, join
+from e2efly.simulation.scenes.shapes import FAR
 from e2efly.validation.scenery import Scenery
 
 LEAST, MOST = 0.5, 1000.0

@@ -13,13 +13,13 @@ from jaxtyping import Array
 
 from e2efly.config import CameraConfig
 from e2efly.courses.origin import Origin
-from e2efly.deploy.sight.source import Frame
-from e2efly.env import Env
-from e2efly.goal import Course
-from e2efly.scenes.meshes.near import Near
-from e2efly.scenes.meshes.scene import MeshScene
-from e2efly.scenes.scene import Scene, gaps
-from e2efly.sensors.eyes import Eye
+from e2efly.environment import Env
+from e2efly.flight.sight.image_source import Frame
+from e2efly.policy.goal import Course
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
+from e2efly.simulation.scenes.meshes.near import Near
+from e2efly.simulation.scenes.scene import Scene, gaps
+from e2efly.simulation.sensors.eyes import Eye
 from e2efly.validation.outlook import Outlook
 from e2efly.validation.plant import RigidState
 from e2efly.validation.starts import draw_starts

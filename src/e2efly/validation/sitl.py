@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.validation.firmware import Firmware
+from e2efly.validation.firmware_program import Firmware
 
 _STATE = struct.Struct("<18d")
 _RC = struct.Struct("<d16H")

@@ -4,9 +4,9 @@ import math
 import struct
 from dataclasses import dataclass, field, replace
 
-from e2efly.deploy.betaflight.codec import Decoder, encode
-from e2efly.deploy.betaflight.link import Link
-from e2efly.deploy.betaflight.messages import MotorTelemetry
+from e2efly.flight.betaflight.codec import Decoder, encode
+from e2efly.flight.betaflight.link import Link
+from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.validation.rig import Rig
 
 

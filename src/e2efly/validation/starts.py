@@ -9,17 +9,17 @@ import numpy as np
 from jaxtyping import Array
 
 from e2efly.config import TaskConfig
-from e2efly.env import UNSEEN, Env, random_key
-from e2efly.env.stress_cameras import CameraDraw, with_noise
-from e2efly.evaluation import drawn_by
-from e2efly.goal import Course
-from e2efly.physics import State
-from e2efly.scenes.scene import Scene
-from e2efly.sensors.eyes import Eye
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.stress_cameras import CameraDraw, with_noise
+from e2efly.policy.goal import Course
+from e2efly.simulation.physics import State
+from e2efly.simulation.scenes.scene import Scene
+from e2efly.simulation.sensors.eyes import Eye
 from e2efly.tasks.route import goal_of
 from e2efly.tasks.task import Task
+from e2efly.validation.evaluation import drawn_by
 from e2efly.validation.plant import RigidState
-from e2efly.validation.sight import Sight
+from e2efly.validation.plant_sight import Sight
 
 BATCH = 250
 """Number of starts that are drawn at once. It is the same as in `e2efly eval`, so that the starts are the same."""

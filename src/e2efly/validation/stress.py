@@ -1,147 +1,122 @@
-"""Fly the rows of `e2efly.stress` on another plant. `e2efly validate --stress` does this."""
+"""Results of a policy in the rows of the stress, with one compiled program."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from e2efly.budget import check_memory
-from e2efly.device import compute_at_once, prepare
-from e2efly.env import UNSEEN, disturbance, random_key
-from e2efly.env.stress import ROWS, Draw, Row, check_rows, check_seen, rows_for
-from e2efly.evaluation import SEED, settling
-from e2efly.stress import Report, draws
-from e2efly.validation.fleet import Flight, Mission, fly_all
-from e2efly.validation.judge import Verdicts, judge
-from e2efly.validation.plant import Plant
-from e2efly.validation.reality import Air, Reality, check_realities
-from e2efly.validation.starts import draw_starts
-from e2efly.validation.validate import SAMPLE, flyable, plant_name
-from e2efly.vehicles import Controller, Vehicle
+from e2efly.environment import UNSEEN, random_key
+from e2efly.environment.episodes import Episodes, run_stepwise, summary
+from e2efly.environment.stress_rows import ROWS, Draw, Row, check_rows, check_seen, rows_for, with_longer_queue
+from e2efly.simulation.device import prepare
+from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
+from e2efly.vehicles import Controller
+from e2efly.vehicles.vehicle import Vehicle
 
-FLIGHTS = 10
-"""Default number of starts per row and criterion. Each takes a second on MuJoCo or through the firmware."""
-AIR = 19 * 8
-"""Memory of the air of one control step, bytes."""
+
+@dataclass(frozen=True)
+class Report:
+    """Results of a policy in each row."""
+
+    candidate: Candidate
+    seed: int
+    flown: dict[str, dict[str, Any]]
+    """For each row and criterion: `Episodes`, or the verdicts on a plant; NumPy arrays."""
+    plant: str = "training"
+    """Where it flew: the training simulator, or a plant."""
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    """Rows that the plant cannot reproduce, and what it cannot change."""
+
+    @property
+    def success(self) -> dict[str, float]:
+        """The success rate of the worst criterion, by row."""
+        return {row: min(float(np.mean(e.success)) for e in criteria.values()) for row, criteria in self.flown.items()}
+
+    @property
+    def worst(self) -> str:
+        """The row with the lowest success rate."""
+        return min(self.success, key=lambda row: self.success[row])
+
+    def as_json(self) -> dict[str, Any]:
+        """The report that `--stress --json` writes: a summary by row and criterion."""
+        return {
+            **self.candidate.as_json(),
+            "plant": self.plant,
+            "seed": self.seed,
+            "left_out": dict(self.left_out),
+            "stress": {row: {name: summary(e) for name, e in found.items()} for row, found in self.flown.items()},
+        }
 
 
 def stress(
     policy: str | os.PathLike[str],
-    plant: str | type[Plant] = "mujoco",
-    episodes: int = FLIGHTS,
+    episodes: int = 1000,
     *,
     rows: tuple[str, ...] = (),
     vehicle: str | None = None,
     controller: Controller = "policy",
     seed: int = SEED,
-    progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
+    device: str | None = None,
     baseline: str | None = None,
 ) -> Report:
-    """Fly a policy with the bridge's runtime on a plant, in every row that the plant can simulate.
-
-    The starts, and the draws of a row, are those of `e2efly.stress.stress`. The random sequences of gusts, drift and
-    noise in flight are different ones.
+    """Fly a policy's file in every row of `ROWS`, from the unseen starts of `evaluate`.
 
     Args:
-        policy: a run directory, a policy.onnx, or the name of a task, which means the policy of the zoo for that task.
-        plant: its name, its reference `path/to/file.py:Name` or `module:Name`, or a registered class.
+        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
         episodes: starts per row and criterion.
-        rows: names of rows. If empty: all rows that the plant can simulate. The report names the others.
-        vehicle: the vehicle of the nominal row, which the other rows change. If left out: the policy's own vehicle.
-        controller: the vehicle to which the flight controller is tuned, in every row: policy or plant.
-        seed: seed of the starts and of the rows' draws.
-        progress: called as progress(criterion, number of finished flights, number of all flights).
-        baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
+        rows: names of rows. Empty: all rows; the rows of cameras only if the policy has cameras.
+        vehicle: the vehicle that flies in the nominal row and that the other rows change. If omitted, the policy's own
+            vehicle.
+        controller: the vehicle for which the flight controller is tuned in every row: policy or plant.
+        seed: the seed of the starts.
+        device: cpu or gpu.
+        baseline: the hover controller that flies in place of the policy; see `evaluate`.
 
     Raises:
-        ValueError: naming the option, its value and what is accepted; or for a row that the plant cannot simulate.
-        OSError: when the plant cannot be started.
+        ValueError: naming the option, its value and what is accepted.
     """
     if episodes <= 0:
         raise ValueError(f"--episodes is {episodes}; accepted: more than 0")
     check_rows(rows)
-    compute_at_once()
-    prepare("cpu")  # the plants compute on the CPU, one vehicle at a time
-    found, kind, own = flyable(policy, plant, vehicle, controller, baseline=baseline)
-    check_seen(rows, found.env.cameras)
-    known = rows_for(found.env.cameras)
-    left_out = {row: lack for row in known if (lack := lacking(kind, ROWS[row]))}
-    if refused := [row for row in rows if row in left_out]:
+    prepare(device)
+    found = candidate(policy, vehicle, controller, baseline=baseline)
+    if found.draws:
         raise ValueError(
-            f"--rows has {refused[0]!r}, but plant {kind.name!r} cannot change {left_out[refused[0]]}; accepted: "
-            + ", ".join(repr(name) for name in known if name not in left_out)
+            f"--vehicle is {vehicle or 'left out'}; accepted with --stress: one vehicle within the ranges of "
+            f"{found.vehicle}, about which the rows lie"
         )
-    flown, believed = found.flown.body, found.flown.believed
-    check_realities(kind, believed, [Reality(flown, 0.0)])
-    chosen = [name for name in known if (name in rows if rows else name not in left_out)]
-    suites = found.task.criteria()
-    longest = max(float(suite.episode_s) for suite in suites.values()) * found.policy.contract.control_rate_hz
-    check_memory({f"--episodes is {episodes}": float(episodes) * len(chosen) * len(suites) * longest * (SAMPLE + AIR)})
-    report: dict[str, dict[str, Verdicts]] = {row: {} for row in chosen}
-    for name, suite in suites.items():
-        env = found.environment(suite)
-        starts = draw_starts(env, episodes, seed)
-        steps = int(np.ceil(float(suite.episode_s) / env.control_period - 1e-6))
-        begins = list(zip(starts.states, starts.courses, strict=True))
-        asked = []
-        for row in chosen:
-            drawn = draws(ROWS[row], flown, seed, episodes)
-            meets = realities(drawn, flown, seed, steps, env.control_period)
-            seen = starts.sights(env, seed, drawn.camera)
-            asked += [Flight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
-        mission = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
-        total = len(asked)
-        flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
-        for i, row in enumerate(chosen):
-            report[row][name] = judge(env, starts, flights[i * episodes : (i + 1) * episodes], settling(suite))
-    return Report(found, seed, report, plant=kind.name, left_out={} if rows else left_out)
+    check_seen(rows, found.env.cameras)
+    return Report(found, seed, fly_rows(found, rows or rows_for(found.env.cameras), episodes, seed))
 
 
-def lacking(kind: type[Plant], row: Row) -> str:
-    """The changes that a row requires and a plant cannot make. Empty: there are none."""
-    return ", ".join(sorted(row.alters - kind.alters))
+def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
+    """Fly `episodes` starts per row and criterion."""
+    flown: dict[str, dict[str, Episodes]] = {row: {} for row in rows}
+    batches = range(-(-episodes // BATCH))
+    for name, suite in found.task.criteria().items():
+        env = with_longer_queue(found.environment(suite))
+        steps, settle = episode_steps(suite, env), settling(suite)
+        for row in rows:
+            parts = []
+            for i in batches:
+                draw = Draw.of(ROWS[row], env.physics.flown, _generator(ROWS[row], seed, i), BATCH)
+                draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
+                key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
+                altered = partial(draw.state, env)
+                parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, altered)[0])
+            flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
+    return flown
 
 
-def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float) -> list[Reality]:
-    """The conditions of a row's flights.
-
-    Args:
-        drawn: the draws of the row.
-        vehicle: the vehicle of the nominal row.
-        seed: seed of the starts.
-        steps: control steps of the longest flight.
-        period: control period, s.
-    """
-    key, n = random_key(seed, UNSEEN, 0), len(drawn.latency)
-    gust, drift, share = (np.asarray(x, np.float64) for x in _tracks(drawn.disturbance, key, steps, period))
-    noise = np.stack([np.asarray(x, np.float64)[:, 0] for x in vars(drawn.noise).values()], axis=1)  # (n, 4)
-    white = np.random.default_rng([seed, UNSEEN, n]).standard_normal((steps, n, 12))
-    error = white * np.repeat(noise, 3, axis=1)
-    error[..., 6:9] /= 2
-    error[..., 0:3] += drift
-    wind = gust + drawn.wind
-    calm = not (wind.any() or error.any() or (share != 1).any())
-    return [
-        Reality(
-            drawn.vehicle(vehicle, i),
-            float(drawn.latency[i]),
-            bool(drawn.plain_mixer[i]),
-            None if calm else Air(wind[:, i], share[:, i], error[:, i]),
-        )
-        for i in range(n)
-    ]
+def draws(row: Row, vehicle: Vehicle, seed: int, n: int) -> Draw:
+    """The first n episodes of a row for the seed of the starts. They do not depend on the number of episodes."""
+    batches = [Draw.of(row, vehicle, _generator(row, seed, i), BATCH) for i in range(-(-n // BATCH))]
+    return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 
 
-@partial(jax.jit, static_argnums=2)
-def _tracks(d: disturbance.Disturbance, key: jax.Array, steps: int, period: float) -> tuple[jax.Array, ...]:
-    """Gusts (t, n, 3), m/s; drift (t, n, 3), m; shares of thrust (t, n, 4): at the start of each control step."""
-
-    def step(d: disturbance.Disturbance, k: jax.Array) -> tuple[disturbance.Disturbance, tuple[Any, ...]]:
-        now = d.gust, d.drift, d.share(jnp.full(d.sag.shape, k / steps))
-        return disturbance.advance(d, jax.random.fold_in(key, k), period), now
-
-    return jax.lax.scan(step, jax.tree.map(jnp.asarray, d), jnp.arange(steps))[1]
+def _generator(row: Row, seed: int, batch: int) -> np.random.Generator:
+    return np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])

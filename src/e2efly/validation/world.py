@@ -13,11 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.physics import State
-from e2efly.physics.body import powered
-from e2efly.physics.integrate import rk4
-from e2efly.physics.plant import Plant
-from e2efly.physics.state import Parts
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.body import powered
+from e2efly.simulation.physics.integrate import rk4
+from e2efly.simulation.physics.state import Parts
 from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles.vehicle import GRAVITY, Vehicle
 

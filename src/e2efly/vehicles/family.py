@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.vehicles.tables import read_table
+from e2efly.config.tables import read_table
 from e2efly.vehicles.vehicle import (
     FAMILIES,
     GRAVITY,

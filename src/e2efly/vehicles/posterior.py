@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.vehicles.tables import read_table, shown
+from e2efly.config.tables import read_table, shown
 from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, sigmas_of, terms, vehicle_file
 
 IDENTIFIED = "identified"

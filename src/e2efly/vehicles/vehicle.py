@@ -14,9 +14,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from e2efly.gravity import GRAVITY
-from e2efly.vehicles.names import nearest, unknown
-from e2efly.vehicles.tables import read_table, shown
+from e2efly.config.names import nearest, unknown
+from e2efly.config.tables import read_table, shown
+from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.terms import check_terms
 
 _LARGEST = 1e6

@@ -1,5 +1,5 @@
 // A policy's world between two of its actions: the queue of the latency, the physics, the task, the observation
-// (e2efly/env/environment.py, sensors/latency.py, sensors/imu.py).
+// (e2efly/env/environment.py, simulation/sensors/latency.py, simulation/sensors/imu.py).
 import { TASKS } from "../tasks/index.js";
 import { GRAVITY } from "./cascade.js";
 import { step } from "./step.js";

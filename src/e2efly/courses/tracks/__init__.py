@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.vehicles.names import unknown
-from e2efly.vehicles.tables import number, numbers, read_table, shown
+from e2efly.config.names import unknown
+from e2efly.config.tables import number, numbers, read_table, shown
 
 _HERE = Path(__file__).parent
 _ACCEPTED = "accepted: closed (true or false), start {position [x, y, z], yaw}, gates [{position, yaw, opening [w, h]}]"

@@ -21,8 +21,8 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
-from e2efly.courses.domain import Domain, extent
-from e2efly.numbers import SPEED
+from e2efly.config.domain import Domain, extent
+from e2efly.config.numbers import SPEED
 from e2efly.tasks.registry import register
 
 

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import number
+from e2efly.config.domain import Domain, extent
+from e2efly.config.numbers import SPEED
 from e2efly.control.vectors import Array, namespace
-from e2efly.courses.domain import Domain, extent
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.numbers import SPEED
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.route import Route
 

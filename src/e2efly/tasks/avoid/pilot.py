@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from e2efly.scenes.scene import Solids
+from e2efly.simulation.scenes.scene import Solids
 
 FAN, HEADINGS = 1.1, 15
 """Largest angle of a compared heading to each side, rad, and the number of headings."""

@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.goal import Outcome
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.generate import forest
-from e2efly.scenes.scene import Scene, Solids
+from e2efly.policy.goal import Outcome
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.generate import forest
+from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, Memory
 from e2efly.tasks.avoid.pilot import best_heading
 from e2efly.tasks.task import at_rest, struck, uniform

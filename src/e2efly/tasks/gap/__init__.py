@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import AlgorithmConfig, BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
-from e2efly.courses.domain import Domain, extent
-from e2efly.numbers import ANGLE, SPEED
+from e2efly.config.domain import Domain, extent
+from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 

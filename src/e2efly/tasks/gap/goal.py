@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import number
+from e2efly.config.domain import Domain, extent
 from e2efly.control.vectors import Array, Quat, namespace
-from e2efly.courses.domain import Domain, extent
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.route import Route, place, turned
 from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate

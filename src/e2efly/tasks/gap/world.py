@@ -9,11 +9,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.goal import Outcome, Shape
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler, rotate, unrotate
-from e2efly.scenes.scene import WALL, Scene, Solids
-from e2efly.scenes.shapes import FAR
+from e2efly.policy.goal import Outcome, Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler, rotate, unrotate
+from e2efly.simulation.scenes.scene import WALL, Scene, Solids
+from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.gap.goal import WALL_WIDTH, GapGoal, Memory, rims
 from e2efly.tasks.task import at_rest, uniform

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.config.domain import Domain
+from e2efly.config.drawing import INK, Line, Mark, Thing, circle
+from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain
-from e2efly.drawing import INK, Line, Mark, Thing, circle
-from e2efly.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 

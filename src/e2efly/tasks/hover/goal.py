@@ -11,8 +11,8 @@ import numpy as np
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.route import Route, beside, place
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground

@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Scene
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.hover.goal import HoverGoal
 from e2efly.tasks.task import at_rest, uniform
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.config.domain import Domain, extent
+from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain, extent
-from e2efly.numbers import ANGLE, BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.goal import Outcome
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Scene, Solids
+from e2efly.policy.goal import Outcome
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.tasks.hover_aware.goal import HoverAwareGoal, Memory
 from e2efly.tasks.task import at_rest, uniform
 

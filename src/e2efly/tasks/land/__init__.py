@@ -16,10 +16,10 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.config.domain import Domain
+from e2efly.config.drawing import INK, ORANGE, Face, Line, Thing, circle
+from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain
-from e2efly.drawing import INK, ORANGE, Face, Line, Thing, circle
-from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 

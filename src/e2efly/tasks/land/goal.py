@@ -10,8 +10,8 @@ import numpy as np
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses.origin import Origin
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.land import LandConfig
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import touches_ground, upright

@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Scene, Solids
-from e2efly.solids import DISC
+from e2efly.courses.solids import DISC
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.tasks.land.goal import LandGoal
 from e2efly.tasks.task import at_rest, uniform
 

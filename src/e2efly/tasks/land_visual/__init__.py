@@ -18,9 +18,9 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.config.domain import Domain, extent
+from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain, extent
-from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 

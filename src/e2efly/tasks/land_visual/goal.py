@@ -7,8 +7,8 @@ import numpy as np
 
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
-from e2efly.goal import Course, Outcome, Shape
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.land.goal import Landing, LandRoute, touchdown
 from e2efly.tasks.land_visual import LandVisualConfig
 

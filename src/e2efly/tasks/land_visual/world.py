@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.goal import Outcome
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Scene, Solids, distances
-from e2efly.solids import DISC, TRIANGLE
+from e2efly.courses.solids import DISC, TRIANGLE
+from e2efly.policy.goal import Outcome
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Scene, Solids, distances
 from e2efly.tasks.land_visual.goal import LandVisualGoal
 from e2efly.tasks.task import at_rest, uniform
 

@@ -20,12 +20,12 @@ from e2efly.config import (
     number,
     shape,
 )
+from e2efly.config.domain import Domain, track_domain
+from e2efly.config.drawing import ORANGE, Face, Mark, Thing
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain, track_domain
 from e2efly.courses.gates import FRAME, Gates
 from e2efly.courses.random_tracks import DOMAIN
 from e2efly.courses.tracks import load_track
-from e2efly.drawing import ORANGE, Face, Mark, Thing
 from e2efly.tasks.registry import register
 
 ANY = "any"

@@ -12,11 +12,11 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.courses.gates import Tracks
 from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, random_tracks
 from e2efly.courses.tracks import load_track
-from e2efly.goal import Outcome, Shape
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.course import frames
-from e2efly.scenes.scene import Scene
+from e2efly.policy.goal import Outcome, Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.course import frames
+from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.race import ANY, RaceConfig
 from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, Memory
 from e2efly.tasks.race.way import NextGates

@@ -8,19 +8,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import number
+from e2efly.config.domain import Domain, track_domain
+from e2efly.config.tables import LARGEST
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain, track_domain
 from e2efly.courses.gates import Gates, Tracks
 from e2efly.courses.tracks import RaceTrack, load_track
-from e2efly.deploy.policy.contract import Contract
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.observation import Field
+from e2efly.policy.contract import Contract
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets, touches_ground
-from e2efly.vehicles.tables import LARGEST
 
 CRUISE = 3.0
 """Speed of a controller that is not a policy, m/s."""

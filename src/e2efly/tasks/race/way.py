@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from e2efly.goal import Shape
-from e2efly.physics import State
-from e2efly.rewards import norm
-from e2efly.scenes.shapes import FAR
+from e2efly.policy.goal import Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.rewards import norm
+from e2efly.simulation.scenes.shapes import FAR
 
 AROUND = 1.5
 """Largest distance in front of a gate of the point through which the way from behind the gate leads, m."""

@@ -11,10 +11,10 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import load_track
-from e2efly.goal import Outcome, Shape
-from e2efly.physics import State
-from e2efly.scenes.course import frames
-from e2efly.scenes.scene import Scene
+from e2efly.policy.goal import Outcome, Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.scenes.course import frames
+from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.any_world import AnyRace, begun
 from e2efly.tasks.race.goal import RaceGoal

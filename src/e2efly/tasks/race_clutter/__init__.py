@@ -24,9 +24,9 @@ from e2efly.config import (
     number,
     shape,
 )
-from e2efly.courses.domain import Domain, Extent, extent, track_domain, union
+from e2efly.config.domain import Domain, Extent, extent, track_domain, union
+from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.courses.tracks import load_track
-from e2efly.numbers import ANGLE, SPEED
 from e2efly.tasks.registry import register
 
 

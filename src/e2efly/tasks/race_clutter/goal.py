@@ -9,20 +9,20 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import number
+from e2efly.config.domain import Domain, extent, track_domain
+from e2efly.config.numbers import SPEED
+from e2efly.config.storage import write_atomically
+from e2efly.config.tables import LARGEST
 from e2efly.control.vectors import Array, namespace
-from e2efly.courses.domain import Domain, extent, track_domain
 from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import load_track, track_text
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.numbers import SPEED
-from e2efly.observation import Field
-from e2efly.storage import write_atomically
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.race import any_goal
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets
-from e2efly.vehicles.tables import LARGEST
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import load_track
-from e2efly.goal import Outcome, Shape
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.course import frames
-from e2efly.scenes.generate import clutter
-from e2efly.scenes.scene import Scene, Solids
-from e2efly.scenes.shapes import FAR
+from e2efly.policy.goal import Outcome, Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.course import frames
+from e2efly.simulation.scenes.generate import clutter
+from e2efly.simulation.scenes.scene import Scene, Solids
+from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal

@@ -17,10 +17,10 @@ from e2efly.config import (
     number,
     shape,
 )
+from e2efly.config.domain import Domain
+from e2efly.config.numbers import BODY_RATE, SPEED
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain
 from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
-from e2efly.numbers import BODY_RATE, SPEED
 from e2efly.tasks.registry import register
 
 

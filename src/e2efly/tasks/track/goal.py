@@ -9,10 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from e2efly.config import number
+from e2efly.config.domain import Domain
+from e2efly.config.names import unknown
+from e2efly.config.numbers import BODY_RATE, SPEED
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
-from e2efly.courses.domain import Domain
 from e2efly.courses.references import (
     LONGEST,
     POINTS,
@@ -23,13 +25,11 @@ from e2efly.courses.references import (
     read_csv,
     through_points,
 )
-from e2efly.goal import Course, Goal, Outcome, Shape
-from e2efly.numbers import BODY_RATE, SPEED
-from e2efly.observation import Field
+from e2efly.policy.goal import Course, Goal, Outcome, Shape
+from e2efly.policy.observation import Field
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.verdicts import distance, offsets, touches_ground
-from e2efly.vehicles.names import unknown
 
 SMALLEST = 1e-3
 """Smallest radius, speed and duration of circle and lemniscate, in their units."""

@@ -10,16 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from e2efly.config.names import unknown
 from e2efly.courses.references import POINTS, SPACING, Lissajous, Spline, knot_count, read_csv, through_points
-from e2efly.goal import Shape
-from e2efly.physics import State
-from e2efly.physics.rotation import from_euler
-from e2efly.scenes.scene import Scene
-from e2efly.tasks.references import polynomial
+from e2efly.policy.goal import Shape
+from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.task import at_rest, into_ball, uniform
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.goal import Memory, TrackGoal
-from e2efly.vehicles.names import unknown
+from e2efly.tasks.track.splines import polynomial
 
 jax.tree_util.register_dataclass(Memory)
 

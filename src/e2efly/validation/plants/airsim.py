@@ -6,12 +6,12 @@ from typing import ClassVar, Self, cast
 import numpy as np
 
 from e2efly.control import COMMAND_MODES
-from e2efly.deploy.pilot.hover import controlled, rates_of
-from e2efly.deploy.policy.contract import Contract
-from e2efly.validation.airsim.camera import Camera, camera_of, opened, taken
-from e2efly.validation.airsim.model import LONG_S, SPUN_S, differences, hold, measure
+from e2efly.flight.pilot.hover import controlled, rates_of
+from e2efly.policy.contract import Contract
+from e2efly.validation.airsim.airsim_camera import Camera, camera_of, opened, taken
+from e2efly.validation.airsim.lockstep import Session
 from e2efly.validation.airsim.rpc import PORT, Rpc
-from e2efly.validation.airsim.session import Session
+from e2efly.validation.airsim.vehicle_model import LONG_S, SPUN_S, differences, hold, measure
 from e2efly.validation.plant import MOMENT, Plant, RigidState, Shutter, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle

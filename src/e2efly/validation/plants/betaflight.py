@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from e2efly.control import COMMAND_MODES, Vec3
-from e2efly.deploy.betaflight.messages import set_raw_rc
-from e2efly.deploy.betaflight.sticks import Sticks
-from e2efly.deploy.pilot.hover import controlled
+from e2efly.flight.betaflight.messages import set_raw_rc
+from e2efly.flight.betaflight.sticks import Sticks
+from e2efly.flight.pilot.hover import controlled
 from e2efly.validation.plant import EVERYTHING, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
 from e2efly.vehicles.vehicle import RATE_LOOP
 
 if TYPE_CHECKING:
-    from e2efly.deploy.bridge import Bridge
+    from e2efly.flight.bridge import Bridge
 
 LATENCY_S = 0.004
 """Latency from a stick frame to the firmware's rate loop, s: half of the bridge's period on the rig, and one round of
@@ -47,13 +47,13 @@ class BetaflightPlant(Plant):
         check_mode(mode, self.name)
         if COMMAND_MODES[mode].controller is None:
             raise ValueError(f"plant 'betaflight' takes no {mode!r} commands; accepted: policies of other modes")
-        from e2efly.validation import firmware
+        from e2efly.validation import firmware_program
+        from e2efly.validation.bridge_session import Session, rehearsal_settings
         from e2efly.validation.rig import Rig
-        from e2efly.validation.session import Session, rehearsal_settings
 
         self.vehicle, self.mode, self._body = vehicle, mode, vehicle
         self._folder = tempfile.TemporaryDirectory(prefix="e2efly-")
-        self._rig = Rig(firmware.chosen(), Path(self._folder.name), vehicle)
+        self._rig = Rig(firmware_program.chosen(), Path(self._folder.name), vehicle)
         try:
             self._rig.start()
             self._session = Session(self._rig, rehearsal_settings(HEIGHT_M))

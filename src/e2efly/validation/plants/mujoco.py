@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.control import Quat, Vec3
-from e2efly.validation.controller import FlightController, rotor_speed_of
+from e2efly.validation.flight_controller import FlightController, rotor_speed_of
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from e2efly.registry import Registry
+from e2efly.config.registry import Registry
 from e2efly.validation.plant import Plant
 
 PLANTS: Registry[type[Plant]] = Registry("plant")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.deploy.policy.contract import Contract
+from e2efly.policy.contract import Contract
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles import Vehicle
@@ -38,7 +38,7 @@ class SimulatorPlant(Plant):
         check_mode(command_mode, self.name)
         import jax
 
-        from e2efly.physics import Physics
+        from e2efly.simulation.physics import Physics
 
         physics = Physics.of(vehicle, command_mode, control_rate=control_rate)
         self._step = physics.control_period / physics.substeps
@@ -71,7 +71,7 @@ class SimulatorPlant(Plant):
         """Put the vehicle into a state, with the rotors at hover speed."""
         import jax.numpy as jnp
 
-        from e2efly.physics import State, started
+        from e2efly.simulation.physics import State, started
 
         arrays = (state.position, state.velocity, state.quaternion, state.body_rate, np.full(4, self._hover))
         p, v, q, w, speed = (jnp.asarray(x, jnp.float32) for x in arrays)
@@ -92,6 +92,6 @@ class SimulatorPlant(Plant):
 
 
 def _advance(physics: Any, state: Any, command: Any, wind: Any, rotor_share: Any) -> Any:
-    from e2efly.physics import step
+    from e2efly.simulation.physics import step
 
     return step(physics, physics.flown, state, command, wind=wind, rotor_share=rotor_share)

@@ -1,0 +1,157 @@
+"""The paper's alignment: find the delay and the rate loop with which the simulator responds to commands as the vehicle
+did.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.identification import Found, Refusal, identify
+from e2efly.alignment.model import Model
+from e2efly.alignment.replay import Stretches, replay, rms, stretches, thrust_is_told, wrong
+from e2efly.alignment.windows import REACH, STEP
+from e2efly.logs.recording import Record
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+EARLY_S = 0.025
+"""Time by which a response may seem to come before its command, s. This happens when the vehicle is quicker than the
+motors and the rate loop of its file."""
+AXES = {"rate_gain_x": "roll", "rate_gain_y": "pitch", "rate_gain_z": "yaw"}
+FLY = "steps or doublets of {} rate, 2 rad/s and more, 0.2 s and longer each, three of them or more"
+SHOWN_S = 0.8
+"""Length of the sections that are shown, s."""
+LEAD_S = 0.12
+"""Part of a shown section before the step, s."""
+JUMP_S = 0.06
+"""A command that changes within this time counts as a step, s."""
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """The result of an alignment, and its accuracy."""
+
+    found: Found
+    """The fit. In it, the vehicle's latency is only the delay from the command to the rate loop."""
+    model: Model
+    """The model whose zeros are the vehicle of the file."""
+    delay: tuple[float, float, float]
+    """Delay from the sending of a command to the rate loop, s: by the file, as found, and its standard deviation. NaN
+    if none was found."""
+    early: float
+    """Time by which the response seemed to come before the command, s, if the delay is fixed at zero. Otherwise 0."""
+    pose_delay: float
+    """Delay of the poses from which the commands were computed, s. It is a part of the vehicle's latency."""
+    estimates: list[Estimate]
+    """Estimates for the vehicle file."""
+    refusals: list[Refusal]
+    before: dict[str, float]
+    """By signal, root mean square error of the file's vehicle in sections that the fit did not see."""
+    after: dict[str, float]
+    """The same for the aligned vehicle."""
+    thrust: float
+    """Measured specific force along body z divided by that of the aligned simulator, in the same sections. NaN if not
+    known."""
+
+
+def align(
+    vehicle: Vehicle,
+    records: Sequence[Record],
+    pose_delay: float = 0.0,
+    told: Callable[[int, float], None] = lambda i, cost: None,
+) -> Alignment:
+    """Fit the delay and the rate loop to flights, and judge both on held-out windows.
+
+    Args:
+        vehicle: the vehicle of the file. Its latency includes the delay of the poses.
+        records: the flights, checked.
+        pose_delay: delay of the poses from which the commands were computed, s.
+        told: called with (iteration, cost) after each iteration of the fit.
+
+    Raises:
+        ValueError: naming the flight and what it lacks; when no parameter can be found, naming all parameters and what
+            to fly.
+    """
+    own = max(float(vehicle.latency) - pose_delay, 0.0)
+    base = dataclasses.replace(vehicle, latency=own)
+    found = identify(base, records, step=True, told=told)
+    model, late = found.model, next((e for e in found.estimates if e.name == "latency"), None)
+    early = 0.0 if late is None else max(-float(late.value), 0.0)
+    if early > EARLY_S:
+        raise ValueError(
+            f"{records[0].path}: the body rates answer {1e3 * early:.0f} ms before the commands were sent; accepted: "
+            "times of both by one clock"
+        )
+    if late is not None and early:
+        prompt = dataclasses.replace(base, latency=0.0)
+        found = identify(prompt, records, believed=base, step=True, delay=False, told=told)
+    if late is None and not found.estimates:
+        reasons = "; ".join(refused(refusal) for refusal in found.refusals)
+        raise ValueError(f"{', '.join(str(r.path) for r in records)}: nothing can be aligned: {reasons}")
+    delay, estimates = (own, np.nan, np.nan), [e for e in found.estimates if e.name != "latency"]
+    if late is not None:
+        value, sigma = max(float(late.value), 0.0), float(np.hypot(late.sigma, early))
+        delay = own, value, sigma
+        estimates.append(dataclasses.replace(late, value=np.array(value + pose_delay), sigma=np.array(sigma)))
+    estimates = [dataclasses.replace(e, source=e.source.replace("; step", "; align")) for e in estimates]
+    before, _ = _held_out(found, model, records, np.zeros(len(model.names)))
+    after, thrust = _held_out(found, found.model, records, found.p)
+    return Alignment(found, model, delay, early, pose_delay, estimates, found.refusals, before, after, thrust)
+
+
+def refused(refusal: Refusal) -> str:
+    """The reason why a parameter was not aligned, and what to fly, in words."""
+    name = refusal.unknown.name
+    if name in AXES:
+        axis = AXES[name]
+        return f"rate_gain of {axis} cannot be had (+- {100 * refusal.sigma:.0f} %); fly {FLY.format(axis)}"
+    return f"the delay cannot be had (+- {1e3 * refusal.sigma:.0f} ms); fly {FLY.format('body')}"
+
+
+def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarray) -> tuple[dict[str, float], float]:
+    """By signal, the root mean square error in windows that the fit did not see, with all their streams. And the thrust
+    in these windows, measured divided by simulated.
+    """
+    windows = found.windows.some(found.held_out)
+    errors: dict[str, list[np.ndarray]] = {}
+    lift, told = 0.0, 0.0
+    for number, record in enumerate(records):
+        begin = windows.begin[windows.flight == number]
+        if not len(begin):
+            continue
+        flown = stretches(record, begin, windows.steps * STEP)
+        seen = replay(model, p, flown)
+        for signal, error in wrong(flown, seen).items():
+            errors.setdefault(signal, []).append(error)
+        if "specific_force" in flown.measured and thrust_is_told(flown):
+            there = flown.there["specific_force"]
+            lift += float(flown.measured["specific_force"][..., 2][there].sum())
+            told += float(seen["specific_force"][..., 2][there].sum())
+    return {signal: rms(np.concatenate(parts)) for signal, parts in errors.items()}, lift / told if told else np.nan
+
+
+def clearest(record: Record, channel: int) -> Stretches:
+    """The section around the largest sudden change of a command that follows a calm period.
+
+    Args:
+        record: the flight.
+        channel: 0: thrust over mass, 1 to 3: body rate about x, y, z.
+    """
+    sent, rates = record.streams["command"], record.streams["body_rate"]
+    first, last = (f(s.time[i] for s in (sent, rates)) for f, i in ((max, 0), (min, -1)))
+    grid = np.arange(first + REACH + LEAD_S, max(last - SHOWN_S + LEAD_S, first + REACH + 2 * LEAD_S), 0.01)
+    past = np.arange(-LEAD_S, 1e-9, 0.01)
+
+    def held(time: np.ndarray) -> np.ndarray:
+        return sent.values[np.clip(np.searchsorted(sent.time, time, side="right") - 1, 0, None), channel]
+
+    before, neutral = held(grid[:, None] + past), 0.0 if channel else GRAVITY
+    restless = 2 * np.std(before, axis=1) + 1.5 * np.abs(before[:, -1] - neutral)
+    start = grid[int(np.argmax(np.abs(held(grid + JUMP_S) - before[:, -1]) - restless))]
+    near = sent.during(start, start + JUMP_S + 0.01)
+    change = np.abs(np.diff(near.values[:, channel])) if len(near.time) > 1 else np.zeros(0)
+    step = near.time[1 + int(np.argmax(change))] if len(change) else start
+    return stretches(record, [step - LEAD_S], SHOWN_S)

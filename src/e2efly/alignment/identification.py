@@ -1,0 +1,352 @@
+"""Identification of a vehicle from flights: streams are checked, cut into windows, and fitted by multiple shooting."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from e2efly.alignment.coarse import begin
+from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, vehicle_of
+from e2efly.alignment.shooting import Fit, fit
+from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
+from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
+from e2efly.logs.recording import MOTORS, Record
+from e2efly.vehicles import Vehicle
+
+SHOWN = 0.5
+"""If the standard deviation is above this fraction of the prior's, the flights say nothing about an unknown."""
+EXACT = {"latency": 0.02, "drag": 0.5}
+"""Standard deviation above which an unknown is refused, s or relative. `EXACT_ELSE` applies to all others."""
+EXACT_ELSE = 0.15
+STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
+"""Spread of the results between models that differ in properties that no log shows: how often the flight controller
+runs, and how the accelerometer is filtered. In s for the delay, else relative."""
+MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
+"""The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so is
+the accelerometer's filter."""
+SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
+"""The same when motor outputs are logged so rarely that they are interpolated between samples."""
+HELD_OUT = 5
+"""One window out of this many is held out of the fit, to judge the result."""
+POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
+LEAST = 1.5
+"""Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
+refused by its standard deviation."""
+TORQUES = 200.0
+"""Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
+NEAR, REFITS = 1.0, 2
+"""`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
+values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An unknown that cannot be found from these flights."""
+
+    unknown: Unknown
+    sigma: float
+    """Standard deviation after the fit, s or relative."""
+    impossible: bool = False
+    """Whether the fitted value is impossible for a rigid body."""
+
+    def __str__(self) -> str:
+        if self.impossible:
+            return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
+        unit = " s" if self.unknown.field == "latency" else ""
+        how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
+        return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
+
+
+@dataclass(frozen=True)
+class Found:
+    """The result of the identification from flights."""
+
+    model: Model
+    fit: Fit
+    windows: Windows
+    """All windows."""
+    held_out: np.ndarray
+    """(n,) which of the windows the fit did not see."""
+    estimates: list[Estimate]
+    refusals: list[Refusal]
+    p: np.ndarray
+    """(u,) values of the unknowns: those of the fit, given that refused unknowns have the values of the file."""
+    sigma: np.ndarray
+    """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
+    structures: dict[str, np.ndarray]
+    """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
+
+    def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
+
+        A flight determines the drag at its own speeds better than the division into a linear and a quadratic part.
+        """
+        covariance = _whole_covariance(self.fit, self.sigma)
+        value, sigma = np.zeros(3), np.zeros(3)
+        for axis in range(3):
+            slope = np.zeros(len(self.p))
+            for power, name in ((1, "drag_linear"), (2, "drag_quadratic")):
+                part = float(getattr(self.model.base, name)[axis]) * speed**power
+                for i, unknown in enumerate(self.model.unknowns):
+                    if unknown.field == name and axis in unknown.entries:
+                        part *= float(np.exp(self.p[i]))
+                        slope[i] = part
+                value[axis] += part
+            sigma[axis] = np.sqrt(slope @ covariance @ slope)
+        return value, sigma
+
+
+def _whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
+    """The covariance with these standard deviations and the correlations of the fit."""
+    spread = np.sqrt(np.diag(found.covariance))
+    return found.covariance / np.outer(spread, spread) * np.outer(sigma, sigma)
+
+
+def driver_of(records: Sequence[Record], step: bool = False) -> str:
+    """The stream that drives the simulation of these flights (`Model.driver`).
+
+    Raises:
+        ValueError: naming the flight that has no such stream.
+    """
+    wanted = ("command",) if step else ("command", "rotor_speed", "motor")
+    if not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
+        wanted = ("motor",)
+    for name in wanted:
+        if all(_drives(record, name, step) for record in records):
+            slow = name == "motor" and any(record.streams[name].rate < TORQUES for record in records)
+            return "motor_and_rate" if slow and all(r.has("quaternion", "position") for r in records) else name
+    lacking = next((r for r in records if not any(_drives(r, name, step) for name in wanted)), records[0])
+    raise ValueError(
+        f"{lacking.path}: has the streams {', '.join(lacking.streams) or 'none'}; accepted: "
+        f"{' or '.join(wanted)} in every flight, besides body_rate (rotor speeds {MOTORS:g} times a second, commands "
+        "whose thrust changes)"
+    )
+
+
+def _drives(record: Record, name: str, step: bool = False) -> bool:
+    """Whether a stream can drive a simulation. Where only the rates are fitted, a command need not tell the thrust."""
+    if not record.has(name):
+        return False
+    stream = record.streams[name]
+    if name == "command":
+        return step or bool(np.ptp(stream.values[:, 0]) > 0)
+    return name != "rotor_speed" or stream.rate >= MOTORS
+
+
+def _shows_motors(record: Record) -> bool:
+    """Whether motor outputs were logged often enough to drive a simulation."""
+    return record.has("motor") and record.streams["motor"].rate >= MOTORS
+
+
+def _volts(records: Sequence[Record]) -> float | None:
+    """The typical battery voltage of these flights, V. None if one of them has no voltage."""
+    if not all(record.has("voltage") for record in records):
+        return None
+    return float(np.median([np.median(record.streams["voltage"].values) for record in records]))
+
+
+def identify(
+    vehicle: Vehicle,
+    records: Sequence[Record],
+    *,
+    believed: Vehicle | None = None,
+    step: bool = False,
+    delay: bool = True,
+    volts: float | None = None,
+    told: Callable[[int, float], None] = lambda i, cost: None,
+) -> Found:
+    """Identify a vehicle from flights.
+
+    Args:
+        vehicle: what is known of the vehicle. Thrust, inertia and drag are found relative to its mass.
+        records: the flights.
+        believed: the vehicle that the flight controller of the flights assumed. If omitted, `vehicle`.
+        step: find only the delay and the rate loop, which steps of body rate show.
+        delay: with `step`, also find the delay.
+        volts: battery voltage for which the thrust is given, V. If omitted, the typical voltage of these flights.
+        told: called with (iteration, cost) after each iteration of the fit.
+
+    Raises:
+        ValueError: naming the flight and what it lacks.
+    """
+    driver = driver_of(records, step)
+    volts = _volts(records) if volts is None else volts
+    parts, length = [], LENGTHS.get(driver, LENGTH)
+    for number, record in enumerate(records):
+        if not record.has("body_rate"):
+            raise ValueError(f"{record.path}: has no body_rate; accepted: a flight with a gyroscope in its log")
+        if record.duration < REACH + 3 * LENGTH:
+            raise ValueError(
+                f"{record.path}: lasts {record.duration:.2f} s; accepted: {REACH + 3 * LENGTH:g} s or more"
+            )
+        seen = (
+            record
+            if not step
+            else dataclasses.replace(
+                record, streams={k: s for k, s in record.streams.items() if k in ("command", "body_rate")}
+            )
+        )
+        parts.append(cut(seen, driver, number, volts))
+    windows = join(parts)
+    if windows.count * length < LEAST:
+        raise ValueError(
+            f"{records[0].path}: {windows.count * length:.1f} s of flight without gaps; accepted: {LEAST:g} s or more"
+        )
+    only = tuple(u.name for u in UNKNOWNS if u.field == "rate_gain" or (u.field == "latency" and delay)) if step else ()
+    model = Model.of(vehicle, driver, believed, only)
+    every = min(HELD_OUT, windows.count)
+    held_out = np.arange(windows.count) % every == every - 1
+    seen = windows.some(~held_out)
+    found = fit(model, seen, begin(model, seen), told=told)
+    sigma = sigmas(model, found)
+    impossible = _impossible(model, found.p)
+    refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+    p = _given(found.p, _whole_covariance(found, sigma), refused)
+    for _ in range(REFITS):
+        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
+            break
+        # far from the fitted values, the linear correction of `_given` is not valid
+        found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
+        sigma = np.where(refused, sigma, sigmas(model, found))
+        p = np.where(refused, 0.0, found.p)
+        impossible |= _impossible(model, p)
+        more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        if np.all(more == refused):
+            break
+        refused, p = more, _given(found.p, _whole_covariance(found, sigma), more)
+    structures = _structures(model, seen, p, refused)
+    if structures:
+        spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
+        sigma = np.where(refused, sigma, np.hypot(sigma, spread))
+    refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
+    source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
+    estimates = _estimates(model, p, sigma, refused, source)
+    if not step:  # with `step`, the fitted delay from command to response is the result
+        estimates = [e for e in estimates if e.name != "latency"]
+        estimates += _latency(model, records, found, p, sigma, refused, source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
+
+
+def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
+    """The unknowns found with other models that explain motor outputs nearly as well.
+
+    Such logs cannot distinguish which part of the motors' response is delay and which is lag, nor how the thrust begins
+    at low outputs. Lag, inertia and thrust depend on it.
+    """
+    names, found = [u.name for u in model.unknowns], {}
+    for label, name in (("without delay", "latency"), ("no thrust at no output", "motor_idle")):
+        if model.driver not in ("motor", "motor_and_rate") or name not in names or refused[names.index(name)]:
+            continue
+        at = names.index(name)
+        other = model
+        if name == "latency":
+            other = dataclasses.replace(model, base=dataclasses.replace(model.base, latency=np.asarray(0.0)))
+        fixed = refused.copy()
+        fixed[at] = True
+        found[label] = fit(other, windows, np.where(fixed, 0.0, p), iterations=8, fixed=fixed).p
+        found[label][at] = p[at]  # a fixed unknown was not estimated
+    return found
+
+
+def _latency(
+    model: Model,
+    records: Sequence[Record],
+    found: Fit,
+    p: np.ndarray,
+    sigma: np.ndarray,
+    refused: np.ndarray,
+    source: str,
+) -> list[Estimate]:
+    """The latency from the vehicle's motion to its rate loop. It is the delay from a command to the rate loop plus, if
+    the log contains it, the age of the poses from which the command was computed.
+
+    The first delay is found from the setpoints, if the flight controller logs them, else by the fit of commands. A
+    delay of motor outputs is not a property of the vehicle. With rarely logged data of a flight controller, the delay
+    between that data and the poses says nothing about the age of the poses, because the data itself is late, by up to
+    the time between two samples.
+    """
+    shown = [late for late in map(setpoint_delay, records) if late is not None]
+    at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
+    if shown:
+        late, off = float(np.mean(shown)), DELAY_SIGMA
+    elif at and model.driver == "command":
+        late, off = float(model.base.latency) + float(p[at[0]]), float(sigma[at[0]])
+    else:
+        return []
+    seldom = model.driver == "motor_and_rate"
+    if seldom:  # every time within an interval is equally likely
+        off = float(np.hypot(off, np.median([np.median(np.diff(r.streams["motor"].time)) for r in records]) / 12**0.5))
+    ages = [
+        record.pose_age + (0.0 if seldom else float(q[POSE_DELAY]))
+        for record, q in zip(records, found.q, strict=True)
+        if record.pose_age is not None
+    ]
+    total = max(late + (float(np.mean(ages)) if ages else 0.0), 0.0)
+    return [Estimate("latency", np.array(total), np.array(off), source)]
+
+
+def _is_vague(unknown: Unknown, sigma: float) -> bool:
+    """Whether the flights say too little about an unknown."""
+    limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
+    return bool(sigma > min(limit, SHOWN * unknown.prior))
+
+
+def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
+    """Which unknown, (u,), is a moment of inertia that is too large: the three moments must satisfy the triangle
+    inequality.
+
+    If the model explains a torque by something else, such as the rotors' own inertia, a moment has no bound in the fit.
+    """
+    moments = np.asarray(vehicle_of(model, jnp.asarray(p)).inertia, float)
+    largest = int(np.argmax(moments))
+    at = np.array([u.field == "inertia" and u.entries == (largest,) for u in model.unknowns])
+    return at & (2 * moments[largest] > moments.sum())
+
+
+def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
+    """The unknowns, given that the refused ones are zero (the values of the file). This is the mean of the normal
+    distribution under that condition. The others then no longer compensate for the fitted values of the refused ones.
+    """
+    if not refused.any() or refused.all():
+        return np.where(refused, 0.0, p)
+    kept = ~refused
+    moved = covariance[np.ix_(kept, refused)] @ np.linalg.solve(covariance[np.ix_(refused, refused)], -p[refused])
+    out = np.zeros_like(p)
+    out[kept] = p[kept] + moved
+    return out
+
+
+def sigmas(model: Model, found: Fit) -> np.ndarray:
+    """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
+    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
+    """
+    noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
+    return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
+
+
+def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
+    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file."""
+    values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
+        if vague or not unknown.field:
+            continue
+        base = np.asarray(getattr(model.base, unknown.field), float)
+        value, spread = values.setdefault(unknown.field, (np.full(base.shape, np.nan), np.full(base.shape, np.nan)))
+        at = list(unknown.entries) if unknown.entries else ...
+        if unknown.field == "latency":
+            value[at], spread[at] = base + x, off
+        else:
+            value[at], spread[at] = base[at] * np.exp(x), np.abs(base[at]) * np.exp(x) * off
+        if unknown.field == "thrust_map":  # the largest thrust grows with the map
+            top = float(model.base.rotor_thrust_max) * np.exp(x)
+            values["rotor_thrust_max"] = np.array(top), np.array(top * off)
+    return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()]
+
+
+def nuisances(found: Found) -> list[dict[str, float]]:
+    """The nuisance parameters of each flight, by name."""
+    return [dict(zip((name for name, _ in NUISANCES), map(float, q), strict=True)) for q in found.fit.q]

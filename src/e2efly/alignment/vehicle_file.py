@@ -1,0 +1,101 @@
+"""The resulting vehicle file: the values of the base, with the identified values and their sigmas in their place."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.alignment.estimates import Estimate
+from e2efly.config.storage import write_atomically
+from e2efly.config.tables import read_table
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.posterior import Entry, read_correlation
+from e2efly.vehicles.vehicle import CORRELATION, check, quantities, vehicle_file
+
+
+def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
+    """The base vehicle with the identified values in place of its own. Moments of inertia that were not found are
+    scaled like the others.
+
+    Raises:
+        ValueError: when the combined values are not a valid vehicle, naming the values.
+    """
+    values = {}
+    for name, estimate in found.items():
+        own = np.asarray(getattr(base, name), float)
+        known = np.isfinite(estimate.value)
+        new = np.where(known, estimate.value, own)
+        if name == "inertia" and known.any():  # otherwise no rigid body might have these three
+            new = np.where(known, new, own * np.mean(estimate.value[known] / own[known]))
+        values[name] = new if new.shape else float(new)
+    vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities(base)} | {"name": base.name} | values))
+    check(vehicle, "identified vehicle")
+    return vehicle
+
+
+def write_vehicle(
+    path: Path,
+    base_name: str,
+    base: Vehicle,
+    found: Mapping[str, Estimate],
+    correlation: tuple[list[str], np.ndarray] = ([], np.zeros((0, 0))),
+) -> Vehicle:
+    """Write the vehicle file.
+
+    Args:
+        path: path of the new TOML file.
+        base_name: the name or path of the base. Its values keep their sources.
+        base: the loaded base.
+        found: the estimates, by field.
+        correlation: names of entries and their correlation matrix, as `e2efly.vehicles.posterior` reads them.
+
+    Raises:
+        ValueError: as for `merged`.
+    """
+    vehicle, table = merged(base, found), read_table(vehicle_file(base_name))
+    lines = [
+        f"# {path.stem}: identified by e2efly, from {base.name}. Every entry: value, unit and source; sigma is the",
+        "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
+    ]
+    for f in quantities(vehicle):
+        entry: dict[str, Any] = table[f.name]
+        lines += ["", f"[{f.name}]", f"value = {_toml(getattr(vehicle, f.name))}", f"unit = {_text(entry['unit'])}"]
+        if f.name in found:
+            lines += [f"sigma = {_toml(found[f.name].sigma, digits=3)}", f"source = {_text(found[f.name].source)}"]
+        else:
+            lines += [f"sigma = {_toml(np.asarray(entry['sigma']))}"] if "sigma" in entry else []
+            lines += [f"source = {_text(entry['source'])}"]
+    names, matrix = _with_older(correlation, read_correlation(table, str(path)), found)
+    if names:
+        lines += ["", f"[{CORRELATION}]", f"of = [{', '.join(map(_text, names))}]", "value = ["]
+        lines += [*(f"    {_toml(row, digits=4)}," for row in matrix), "]"]
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
+    return vehicle
+
+
+def _with_older(
+    new: tuple[list[str], np.ndarray], old: tuple[list[str], np.ndarray], found: Mapping[str, Estimate]
+) -> tuple[list[str], np.ndarray]:
+    """The new correlations, and those of the base between entries for which nothing new was found."""
+    kept = [i for i, name in enumerate(old[0]) if Entry.of(name).field not in found]
+    size = len(new[0])
+    matrix = np.eye(size + len(kept))
+    matrix[:size, :size], matrix[size:, size:] = new[1], old[1][np.ix_(kept, kept)]
+    return [*new[0], *(old[0][i] for i in kept)], matrix
+
+
+def _toml(value: Any, digits: int = 6) -> str:
+    if np.ndim(value):
+        return f"[{', '.join(_toml(x, digits) for x in value)}]"
+    return _number(float(value), digits)
+
+
+def _number(x: float, digits: int) -> str:
+    said = f"{x:.{digits}g}"
+    return said if any(c in said for c in ".ne") else f"{said}.0"
+
+
+def _text(words: str) -> str:
+    escaped = words.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else " " for c in escaped) + '"'

@@ -1,0 +1,46 @@
+"""Options of the commands that read flight logs."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from e2efly.logs.readers import Reading
+    from e2efly.logs.recording import Record
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """How logs are read."""
+
+    columns: tuple[str, ...] = ()
+    """Maps the column names of a CSV log, or of the record of a thrust stand, to ours: OURS=THEIRS or
+    OURS=THEIRS*FACTOR, as in az=acc_z*9.81. In a log of any other kind, THEIRS is one of our names of the same stream,
+    as in az=az*9.81 or m1=m4."""
+    topics: tuple[str, ...] = ()
+    """Topics of ROS bags that are taken before all others. The notes on a log say which topics were taken."""
+    without: tuple[str, ...] = ()
+    """Streams that are left out, such as rotor_speed."""
+
+    def reading(self, known: "Collection[str] | None" = None) -> "Reading":
+        """The options, checked. `known`: our names of columns; those of flights unless given.
+
+        Raises:
+            ValueError: naming the option that is wrong, and what is accepted.
+        """
+        from e2efly.logs.csv_file import COLUMNS, column_map
+        from e2efly.logs.readers import Reading
+
+        return Reading(column_map(self.columns, COLUMNS if known is None else known), self.topics, self.without)
+
+
+def show_notes(records: "Sequence[Record]", console: Console, known: "Sequence[Record]" = ()) -> None:
+    """Print what was left out or changed in each record, except for what was noted on the records that are known."""
+    told = {note for record in known for note in record.notes}
+    for record in records:
+        for note in record.notes:
+            if note not in told:
+                console.print(f"{record.path.name}: {note}", style="dim", markup=False)

@@ -1,0 +1,442 @@
+"""The one environment, for every task and algorithm: pure `reset` and `step`, batched over one leading axis.
+
+A control step has these parts, in this order. The action joins the latency queue. The physics runs its sub-steps with
+the commands that leave the queue. The task judges the result. The reward is summed. The policy's observation is built
+from the (delayed, noisy) state. Vehicles whose episode ended start again. Their cameras render. All of it is
+differentiable, except the events and the images.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from e2efly.config import (
+    CameraConfig,
+    DisturbanceConfig,
+    EnvConfig,
+    ImuConfig,
+    NoiseConfig,
+    RewardConfig,
+    TaskConfig,
+)
+from e2efly.config.env import FILE, RANDOM, STILL
+from e2efly.control import COMMAND_MODES
+from e2efly.environment import disturbance, expert
+from e2efly.environment.camera_images import newest
+from e2efly.environment.draws import between, delays, deviations, perturbed
+from e2efly.environment.env_state import DISTURBED, INERTIAL, SEEN, STARTS, EnvState, Step, pushed, where
+from e2efly.environment.limits import latencies_of, limits_of, posterior_of
+from e2efly.environment.rules import check
+from e2efly.environment.signals import dangers, happened
+from e2efly.policy.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
+from e2efly.simulation import rewards
+from e2efly.simulation.physics import Physics, started, step
+from e2efly.simulation.physics.body import hover_rotor_speed
+from e2efly.simulation.physics.rotation import unrotate
+from e2efly.simulation.scenes import scene as scenes
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
+from e2efly.simulation.scenes.scene import Scene
+from e2efly.simulation.sensors import imu, latency
+from e2efly.simulation.sensors.eyes import Eye, image_shape, steady
+from e2efly.simulation.sensors.noise import add_noise
+from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
+from e2efly.vehicles import Family, Flown, load_family, load_vehicle
+from e2efly.vehicles.family import DRAWN
+from e2efly.vehicles.posterior import IDENTIFIED, Posterior
+
+LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
+"""Look-ahead times for which a critic is given the clearance, s."""
+DEFAULT = EnvConfig()
+"""The VIS-R; only the starts are random."""
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=[
+        "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
+        "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "noise", "imu", "cameras",
+    ],
+    meta_fields=["queue", "seen_actions", "past", "family"],
+)  # fmt: skip
+@dataclass(frozen=True)
+class Env:
+    """Make it with `Env.of`. Its numbers are leaves: pass it to compiled functions, replace them freely."""
+
+    physics: Physics
+    task: Task
+    weights: dict[str, Any]
+    parameters: dict[str, Any]
+    center: Float[Array, "4"]
+    """Command at action 0, of the nominal vehicle."""
+    half: Float[Array, "4"]
+    """Half of the command's range."""
+    hover: Float[Array, "4"]
+    """The action with which a level vehicle hovers, if the command mode has one. Otherwise the middle of the range."""
+    latency_range: Float[Array | np.ndarray, "2"]
+    observation_latency_range: Float[Array | np.ndarray, "2"]
+    randomize: dict[str, Any]
+    """Relative half-width of each randomised vehicle parameter."""
+    posterior: Posterior | None
+    """The distribution from which an identified vehicle is drawn. None: the vehicle is not drawn."""
+    wind: Any
+    """Largest wind speed, m/s; None: still air."""
+    disturbance: DisturbanceConfig | None
+    noise: NoiseConfig | None
+    imu: ImuConfig | None
+    cameras: tuple[CameraConfig, ...]
+    queue: int
+    """Number of actions that are kept."""
+    seen_actions: int
+    """Number of past actions in the observation."""
+    past: int
+    """Number of states that are kept for delayed observations and images. 0: none."""
+    family: Family | None = None
+    """The family, if every episode has a different vehicle, which its flight controller knows. `physics` holds the
+    middle one."""
+
+    @staticmethod
+    def of(
+        task: TaskConfig,
+        reward: RewardConfig,
+        config: EnvConfig = DEFAULT,
+        dtype: type = np.float32,
+        flown: Flown | None = None,
+    ) -> "Env":
+        """Build the environment of a configuration.
+
+        Args:
+            task: the options of the task.
+            reward: the reward.
+            config: the configuration. Its vehicle gives the limits of the commands, the control rate and the latency.
+            dtype: the type of all numbers.
+            flown: the vehicle that flies, and the one that the flight controller assumes. None: both are the
+                configuration's vehicle. If that is a family, every episode draws a vehicle.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        family = load_family(config.vehicle)
+        vehicle = load_vehicle(config.vehicle) if family is None else family.middle
+        physics = Physics.of(
+            vehicle, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
+        )
+        period, body = physics.control_period, vehicle
+        if flown is not None:
+            body, believed = flown.body, flown.believed
+            physics = Physics.of(
+                believed, config.command_mode, config.integrator, config.control_rate, config.largest_step, dtype
+            )
+            physics = physics if flown.as_believed else physics.flying(body, dtype)
+        posterior = posterior_of(config)
+        check(config, task, body, posterior)
+        rewards.check(reward.weights, reward.parameters)
+        late = config.action_latency or latencies_of(config, body, family if flown is None else None, posterior)
+        frames = latency.frames(late[1], period)
+        seen = frames if config.past_actions is None else config.past_actions
+        mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
+        noisy = config.noise != NoiseConfig()
+        shape = Shape(body.feet_height, body.radius)
+        oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
+        return Env(
+            physics=physics,
+            task=make_task(task, shape, period, physics.substeps),
+            weights=dict(reward.weights),
+            parameters=dict(reward.parameters),
+            center=((low + high) / 2).astype(dtype),
+            half=((high - low) / 2).astype(dtype),
+            hover=((np.asarray(mode.hover(vehicle)) - low) / (high - low) * 2 - 1).astype(dtype),
+            latency_range=np.asarray(late, dtype),
+            observation_latency_range=np.asarray(config.observation_latency, dtype),
+            randomize={name: width for name, width in config.randomize.items() if name != IDENTIFIED},
+            posterior=posterior and dataclasses.replace(posterior, root=posterior.root.astype(dtype)),
+            wind=config.wind or None,
+            disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
+            noise=config.noise if noisy else None,
+            imu=config.imu if config.imu.observed else None,
+            cameras=config.cameras,
+            queue=max(frames + 1, seen, 2),
+            seen_actions=seen,
+            past=latency.frames(oldest, period) + 1 if oldest else 0,
+            family=family if flown is None else None,
+        )
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether episodes have vehicles, delays, air or cameras that differ from those of the files."""
+        sooner, later = self.latency_range
+        spread = sooner != later and self.family is None
+        spread = spread or any(camera != steady(camera) for camera in self.cameras)
+        drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
+        return bool(spread or drawn or self.wind or (self.disturbance or DisturbanceConfig()) != DisturbanceConfig())
+
+    @property
+    def vehicles(self) -> str:
+        """The name of what flies, for everything that tells a success."""
+        if self.is_disturbed:
+            return RANDOM
+        return FILE if self.family is None else STILL
+
+    def undisturbed(self) -> "Env":
+        """The environment with the vehicle of the file, its delay, still air, and nominal cameras.
+
+        For a family, it has the family's vehicles and their delays. Only numbers differ, so the same compiled programs
+        accept it.
+        """
+        nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
+        return dataclasses.replace(
+            self,
+            latency_range=np.stack([nominal, nominal]) if self.family is None else self.latency_range,
+            randomize={name: 0 * width for name, width in self.randomize.items()},
+            posterior=self.posterior and self.posterior.times(0.0),
+            wind=self.wind and 0 * self.wind,
+            disturbance=self.disturbance and DisturbanceConfig(),
+            cameras=tuple(map(steady, self.cameras)),
+        )
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The observation, field by field."""
+        sensed = () if self.imu is None else (GYROSCOPE, ACCELEROMETER)
+        last = (past_actions(self.seen_actions),) if self.seen_actions else ()
+        return (*self.task.fields, ATTITUDE, VELOCITY, BODY_RATE, *sensed, *last)
+
+    @property
+    def observation_size(self) -> int:
+        """Number of entries of the observation."""
+        return sum(f.size for f in self.fields)
+
+    @property
+    def control_period(self) -> float:
+        """Duration of a control step, s."""
+        return self.physics.control_period
+
+    def command(self, action: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
+        """The nominal action map: linear from [-1, 1] to the command's range, and clipped to it."""
+        return self.center + self.half * jnp.clip(action, -1.0, 1.0)
+
+    def reset(self, key: PRNGKeyArray, n: int) -> tuple[EnvState, Float[Array, "n o"]]:
+        """Start `n` episodes.
+
+        Returns:
+            The state and the first observation.
+        """
+        state = self._start(key, n, jnp.zeros((), jnp.int32))
+        return self.look(state, jnp.ones(n, bool)), self._observe(state)
+
+    def step(
+        self, state: EnvState, action: Float[Array, "n 4"], *, restart: bool = True, privileged: bool = False
+    ) -> tuple[EnvState, Step]:
+        """One control step.
+
+        Args:
+            state: the state from `reset` or from the previous step.
+            action: in [-1, 1]. Values outside are clipped.
+            restart: whether to start a new episode where one ended. Otherwise the ended episode continues.
+            privileged: fill `Step.final_privileged`, for a critic.
+
+        Returns:
+            The state to act on next, and what happened.
+        """
+        reached, out = self._advance(state, action)
+        if privileged:
+            out = dataclasses.replace(out, final_privileged=self.privileged(reached))
+        if not restart:
+            return self.look(reached, jnp.zeros_like(out.terminated)), out
+        reached, out = self._restart(reached, out)
+        return self.look(reached, out.done), out
+
+    def look(self, state: EnvState, renewed: Bool[Array, " n"], world: Scene | MeshScene | None = None) -> EnvState:
+        """The state with the images that are available to act on.
+
+        Cameras whose next image is due render a new image, and so do the cameras of vehicles whose episode is new.
+
+        Args:
+            state: the state of the vehicles, with the images so far.
+            renewed: which vehicles have a new episode.
+            world: what is seen in place of the task's worlds: n worlds, or one world of triangles for all vehicles.
+        """
+        if not self.cameras:
+            return state
+        scene = self.task.scene(jax.lax.stop_gradient(state.memory)) if world is None else world
+        return dataclasses.replace(state, images=newest(self.cameras, scene, state, renewed, self.control_period))
+
+    @property
+    def privileged_size(self) -> int:
+        """Number of entries of `privileged`."""
+        return 3 + len(LEADS) if self.cameras else 0
+
+    def privileged(self, state: EnvState) -> Float[Array, "n p"]:
+        """What a critic may know in addition to the observation, if there are cameras. Empty without cameras.
+
+        It is the vector to the goal in the body frame, and the clearance where the vehicle will be after each of
+        `LEADS` if it flies straight on. Unit m, clipped to a few metres.
+        """
+        n = state.time.shape[0]
+        if not self.cameras:
+            return jnp.zeros((n, 0))
+        s, scene = state.vehicle, self.task.scene(jax.lax.stop_gradient(state.memory))
+        away = unrotate(s.quaternion, self.task.goal(state.memory, state.time) - s.position)
+        ahead = jax.vmap(lambda t: scenes.clearance(scene, s.position + t * s.velocity, state.time + t), out_axes=1)
+        return jnp.concatenate([jnp.clip(away, -5.0, 5.0), jnp.clip(ahead(jnp.asarray(LEADS)), -1.0, 3.0)], axis=-1)
+
+    def _restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
+        """Start a new episode where `out` says that the episode ended."""
+
+        def anew(_: None) -> tuple[EnvState, Array]:
+            fresh = self._start(state.key_of(STARTS), out.reward.shape[0], state.tick)
+            chosen = where(out.done, dataclasses.replace(fresh, key=state.key), state)
+            return chosen, self._observe(chosen)
+
+        state, observation = jax.lax.cond(jnp.any(out.done), anew, lambda _: (state, out.final_observation), None)
+        return state, dataclasses.replace(out, observation=observation)
+
+    def _advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
+        """One control step without new starts, with the images of the previous step."""
+        period = self.control_period
+        actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
+        old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
+        before, physics = state.vehicle, self._physics(state.family)
+        plant = dataclasses.replace(physics.flown, **state.plant)
+        wind, share, disturbed = state.wind, None, state.disturbance
+        if disturbed is not None:
+            gust = jnp.asarray(disturbed.gust)
+            wind = gust if wind is None else wind + gust
+            share = disturbed.share(state.time / self.task.episode_s)
+            disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
+        after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
+
+        time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
+        late = time >= self.task.episode_s - 1e-3 * period
+        memory, outcome = self.task.advance(state.memory, before, after, time, late)
+        inertial = state.imu
+        if self.imu is not None and inertial is not None:
+            inertial = imu.measure(self.imu, state.key_of(INERTIAL), inertial, before, after, period)
+        reached = dataclasses.replace(
+            state,
+            vehicle=after,
+            memory=memory,
+            time=time,
+            actions=actions,
+            disturbance=disturbed,
+            past=None if state.past is None else pushed(state.past, after),
+            imu=inertial,
+            tick=state.tick + 1,
+        )
+        signals = happened(self.task, state, reached, action, outcome)
+        if self._reads("expert_action") and isinstance(self.task, Guided) and physics.command_mode == "ctbr":
+            signals["expert_action"] = self.expert_action(state)
+        if self._reads("clearance", "gaps"):
+            signals |= dangers(self.task, memory, after, time)
+        total, terms = rewards.reward(self.weights, self.parameters, signals)
+        observation = self._observe(reached)
+        return reached, Step(
+            observation=observation,
+            final_observation=observation,
+            reward=total,
+            terms=terms,
+            terminated=outcome.terminated,
+            truncated=late & ~outcome.terminated,
+            success=outcome.success,
+            error=outcome.error,
+        )
+
+    def _start(self, key: PRNGKeyArray, n: int, tick: Int[Array, ""]) -> EnvState:
+        task_key, plant_key, wind_key, action_key, observation_key, eyes_key, onward = jax.random.split(key, 7)
+        family = None
+        if self.family is not None:
+            family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
+        flown = self._physics(family).flown
+        disturbed, plant = None, perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
+        if self.posterior is None:
+            late = between(action_key, n, self.latency_range)
+        else:
+            deviation = deviations(jax.random.fold_in(plant_key, 3), n, self.posterior, self.center.dtype)
+            plant |= self.posterior.values(self.physics.flown, deviation)
+            nominal = self.physics.flown.latency
+            late = delays(action_key, self.latency_range, nominal, self.posterior, deviation)
+        if self.disturbance is not None:
+            disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
+            disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
+            rotors: Any = plant.get("rotor_position", flown.rotor_position)
+            offset = self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
+            if self.family is not None:  # in proportion to the size
+                offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
+            plant["rotor_position"] = rotors - offset
+        dtype = self.center.dtype
+        vehicle, memory = self.task.start(task_key, n)
+        rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, 4))
+        vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
+        vehicle = jax.tree.map(lambda x: x.astype(dtype), started(self.physics, flown, vehicle))
+        past = None
+        if self.past:
+            past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)
+        return EnvState(
+            vehicle=vehicle,
+            memory=memory,
+            time=jnp.zeros(n, dtype),
+            actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
+            action_latency=late,
+            plant=plant,
+            wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
+            family=family,
+            disturbance=disturbed,
+            past=past,
+            observation_latency=between(observation_key, n, self.observation_latency_range),
+            imu=None if self.imu is None else imu.ImuState.at(vehicle),
+            eyes=tuple(Eye.of(c, jax.random.fold_in(eyes_key, i), n) for i, c in enumerate(self.cameras)),
+            images=tuple(jnp.zeros((n, *image_shape(camera))) for camera in self.cameras),
+            key=onward,
+            tick=tick,
+        )
+
+    def _physics(self, family: Float[Array, "n u"] | None) -> Physics:
+        """The physics of each episode's vehicle."""
+        if self.family is None or family is None:
+            return self.physics
+        return self.physics.of_each(self.family.draw(family))
+
+    def _reads(self, *signals: str) -> bool:
+        """Whether a reward term reads one of these signals."""
+        return any(signal in rewards.TERMS.find(name).inputs for name in self.weights for signal in signals)
+
+    def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
+        """The action of an expert that knows the whole world and this vehicle. It has no gradient.
+
+        For tasks that have an `expert`, and for commands of thrust and body rates.
+        """
+        assert isinstance(self.task, Guided)
+        state = jax.lax.stop_gradient(state)
+        vehicle = self._physics(state.family).nominal
+        queue, latency = self.command(state.actions), state.action_latency
+        known = {name: state.plant[name] for name in ("rate_gain", "motor_time_constant") if name in state.plant}
+        flown = dataclasses.replace(vehicle, **known)
+        motion = expert.ahead(flown, state.vehicle, queue, latency, self.control_period)
+        velocity, yaw = self.task.expert(state.memory, motion.position.stack(), motion.velocity.stack())
+        command = expert.command(flown, (self.center + self.half)[0], motion, velocity, yaw)
+        needed = state.plant.get("mass", vehicle.mass) / vehicle.mass
+        if state.disturbance is not None:
+            lifted = state.disturbance.share(state.time / self.task.episode_s)
+            needed = needed / jnp.mean(lifted, axis=-1)
+        command = command.at[:, 0].multiply(needed)
+        return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
+
+    def _observe(self, state: EnvState) -> Float[Array, "n o"]:
+        seen = state.vehicle
+        if state.past is not None:
+            seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
+        if state.disturbance is not None:
+            seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
+        if self.noise is not None:
+            seen = add_noise(self.noise, state.key_of(SEEN), seen)
+        n = seen.position.shape[0]
+        parts = [self.task.observe(state.memory, state.time, seen), seen.quaternion, seen.velocity, seen.body_rate]
+        if state.imu is not None:
+            parts += [state.imu.gyroscope, state.imu.accelerometer]
+        parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
+        return jnp.concatenate(parts, axis=-1)

@@ -1,0 +1,456 @@
+"""The bridge: at each control step, it turns poses and the flight controller's replies into stick commands."""
+
+import dataclasses
+import math
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from e2efly.control import Ctbr, Quat, Vec3
+from e2efly.flight.attitude import Attitude, turned
+from e2efly.flight.betaflight.client import Client, Reply
+from e2efly.flight.betaflight.controller import ControllerInfo
+from e2efly.flight.betaflight.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
+from e2efly.flight.betaflight.messages import AttitudeReply, MotorTelemetry, RawImu, set_raw_rc
+from e2efly.flight.betaflight.sticks import sticks_of
+from e2efly.flight.filter.filter import Filter
+from e2efly.flight.filter.guard import Keeper
+from e2efly.flight.log_record import (
+    Log,
+    Sent,
+    record_filter,
+    record_link,
+    record_map,
+    record_message,
+    record_mode,
+    record_odometry,
+    record_policy,
+    record_sent,
+)  # fmt: skip
+from e2efly.flight.pilot import estimate, guidance, inertial, state_machine
+from e2efly.flight.pilot.estimate import LATE_S, Estimate, height_of
+from e2efly.flight.pilot.flight_state import AIRBORNE, GROUNDED, Flight, Inputs, Mode
+from e2efly.flight.pilot.hover import LIFTED, controlled, flight_gains, rates_of
+from e2efly.flight.pilot.hovering import DEFAULT, HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
+from e2efly.flight.pilot.inertial import FRESH_S, Measurement
+from e2efly.flight.pilot.landing import has_stood
+from e2efly.flight.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
+from e2efly.flight.pilot.touch import LAGS
+from e2efly.flight.pose.conditions import Checks
+from e2efly.flight.pose.pace import pace_problem
+from e2efly.flight.pose.pose_source import PoseSource
+from e2efly.flight.settings import FlightSettings
+from e2efly.flight.sight import quality
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.flight.sight.quality import Seen as Watched
+from e2efly.policy.odometry import Odometry, Sample, yaw_of
+from e2efly.policy.runtime import Decision, Imu
+from e2efly.policy.worker import Worker
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
+"""Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
+poses."""
+DELAY_STEPS = 50
+"""On the ground, the delay of the poses is measured every so many control steps."""
+SILENT_S = 0.1
+"""If the controller has said nothing for this time, it may hold the next command for as long as its silence lasts,
+s."""
+DEAF_S = 0.5
+"""After a silence, the accelerometer has this time to be heard again, s."""
+CUT = Ctbr(0.0, Vec3(0.0, 0.0, 0.0))
+"""The command that stands for a closed throttle."""
+ACTING_S = 0.25
+"""A measured force is compared with a throttle only if the commands of this time before it have arrived, s."""
+RARELY_S = 0.3
+"""If a stick frame was acknowledged as often as this in a silence, s, the others have arrived, too."""
+ANEW_S = 1.0
+"""After a silence as long as `link_timeout`, acknowledgements may belong to other frames for this time, s."""
+HISTORY_S = 30.0
+"""How long the sent throttles are remembered, s. The link may be silent for a long time."""
+
+
+class Bridge:
+    """One flight controller, one pose source, one vehicle, and an optional policy.
+
+    `tick` never raises because of data from the link or the pose source, or because of what the policy does.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        info: ControllerInfo,
+        source: PoseSource,
+        vehicle: Vehicle,
+        settings: FlightSettings,
+        *,
+        worker: Worker | None = None,
+        log: Log | None = None,
+        latency: float | None = None,
+        settings_problems: tuple[str, ...] = (),
+        throttle_map: ThrottleMap | None = None,
+        cameras: Sequence[ImageSource] = (),
+        filter: Filter | None = None,
+        hover: HoverController | None = None,
+    ) -> None:
+        """Create a bridge for a vehicle on the ground.
+
+        Args:
+            client: sends requests to the controller.
+            info: what the controller reported about itself.
+            source: delivers poses.
+            vehicle: the loaded vehicle.
+            settings: what the flight may do.
+            worker: calls the policy, or listens to an external commander. None: the vehicle only hovers.
+            log: the record of the flight. None: no record is kept.
+            latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
+            settings_problems: why the controller's settings forbid a take-off.
+            throttle_map: learned in earlier flights. None: the map of the vehicle file.
+            cameras: what the policy sees, in the order of the images in its contract.
+            filter: keeps the policy inside the fence. None: the guard ends the policy's flight at the fence.
+            hover: the controller for take-off, hover and landing. None: the default controller, for this latency.
+        """
+        delay: float = vehicle.latency if latency is None else latency
+        self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
+        self.gentle = flight_gains(vehicle, delay)
+        """The vehicle with gains that suit the latency."""
+        self.hover = hover or hover_controller(DEFAULT, vehicle, delay)
+        """The controller for take-off, hover and landing."""
+        self.latency = delay
+        """The time from the vehicle's motion to its rate loop, s."""
+        self.worker, self.log, self.land_now = worker, log, False
+        """`land_now`: the operator asks for a landing, as the pilot does with the mission switch."""
+        self.cameras = tuple(cameras)
+        images = () if worker is None else worker.images
+        self.seen = tuple(Watched(image) for image, _ in zip(images, self.cameras, strict=True))
+        """What is known about each camera."""
+        self.instruments = Instruments(client, settings)
+        self.adopt(info, settings_problems)
+        self.flight, self.inputs = Flight(home=settings.ground_height), Inputs()
+        self.estimate = Estimate(Checks(max_age=settings.odometry_timeout), delay + LATE_S)
+        self.map = throttle_map or ThrottleMap.of(vehicle)
+        self.trim = 0.0
+        """Thrust that compensates for an error of the throttle map, m/s^2."""
+        self.imu: Imu | None = None
+        """The newest credible measurement of the inertial sensors."""
+        self.sent = Sent("closed", None, 0.0, self._closed())
+        self.keeper = None if filter is None else Keeper(filter)
+        self._hovering, self._under_way = self.hover.begin(), UnderWay()
+        self._history = ThrottleHistory(HISTORY_S)
+        self._turns: deque[tuple[float, tuple[float, float, float]]] = deque(maxlen=128)
+        self._overdue: tuple[float, ...] = ()
+        self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
+        self._held, self._looked = self.sent, 0.0
+
+    def adopt(self, info: ControllerInfo, settings_problems: tuple[str, ...]) -> None:
+        """Take over the controller's settings as they were read, and the reasons why they forbid a take-off."""
+        self.info, self.sticks, self.settings_problems = info, sticks_of(info), settings_problems
+        self.probe = ChannelProbe()
+
+    def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
+        """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
+        it.
+        """
+        dt = min(max(now - self._last, 0.0), 0.1) if self._last else 0.0
+        self._last, self._ticks = now, self._ticks + 1
+        self._under_way = sent(self._under_way, self.sent.command or CUT, dt, self.vehicle, self.latency)
+        late = (*self._overdue, now) if lateness > self.settings.lateness else self._overdue
+        self._overdue = tuple(moment for moment in late if moment >= now - 1.0)
+        _, reading = self._perceive(now)
+        self._decide(now, slack)
+        self.sent = self._send(now, *self._kept(now, *self._command(now, dt)))
+        if self.log is not None:
+            self._record(self.log, now, reading)
+        return self.sent
+
+    def look(self, now: float) -> list[Sample]:
+        """Read poses and the controller's replies, without deciding or sending anything. Returns the poses."""
+        return self._perceive(now, sends=False)[0]
+
+    @property
+    def flying(self) -> bool:
+        """Whether this bridge may have brought the vehicle into the air."""
+        return self.flight.mode in AIRBORNE
+
+    @property
+    def odometry(self) -> Odometry | None:
+        """The newest odometry that passed the checks."""
+        return self.estimate.odometry
+
+    @property
+    def height(self) -> float:
+        """Height over the place of take-off, from the last odometry, m."""
+        return height_of(self.odometry, self.flight)
+
+    @property
+    def decision(self) -> Decision | None:
+        """What the policy wants. None: the policy is not flying."""
+        return self.worker.decision if self.worker is not None and self.flight.mode is Mode.POLICY else None
+
+    @property
+    def setpoint(self) -> tuple[list[float] | None, float | None]:
+        """The position where the vehicle should be, world, m, and its yaw, rad."""
+        if (decision := self.decision) is not None:
+            return None if decision.position is None else decision.position.tolist(), None
+        target = self.flight.target
+        return (None, None) if target is None else (list(target.position), target.yaw)
+
+    def _perceive(self, now: float, *, sends: bool = True) -> tuple[list[Sample], Reading]:
+        """Read poses and the controller's replies, and combine them."""
+        self.client.poll(now)
+        if now - self.client.heard > SILENT_S:
+            self._heard_since = now
+        if now - self.client.heard > self.settings.link_timeout and not self.client.lossy(now):
+            self._broken = now
+        if self.client.heard >= self._looked:
+            self._held = self.sent  # a controller that is not heard from now on has at least this one
+        self._looked = now
+        samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
+        self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
+        if self.worker is not None:
+            self.worker.hear(self.odometry, now)
+        odometry = self.odometry if self.flying else None
+        self.seen = tuple(
+            quality.see(seen, camera.read(now), now, odometry, self.settings.ground_height, camera.problem)
+            for seen, camera in zip(self.seen, self.cameras, strict=True)
+        )
+        reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
+        self.inputs = self._judge(now, reading, sends=sends)
+        self._feel(now, reading)
+        return samples, reading
+
+    def _judge(self, now: float, reading: Reading, *, sends: bool) -> Inputs:
+        """The inputs of the state machine."""
+        flight, mode = self.flight, self.flight.mode
+        probed = self.probe.look(now, reading, self.sticks, grounded=mode is Mode.INIT) if sends else ()
+        self.estimate = told = estimate.compare(self.estimate, mode, measure_delay=self._ticks % DELAY_STEPS == 0)
+        slow = pace_problem(told.pace, self.settings.odometry_timeout)
+        return Inputs(
+            odometry=told.odometry,
+            odometry_problem=told.pose_problem,
+            link_problem=reading.link_problem,
+            silent=now - self.client.heard > SILENT_S,
+            failsafe=reading.failsafe,
+            armed=reading.armed,
+            override=reading.override,
+            pilot=reading.pilot,
+            voltage=reading.voltage,
+            settings_problems=(
+                *self.settings_problems,
+                *probed,
+                *reading.meddling,
+                *reading.armed_with,
+                *((slow,) if slow else ()),
+            ),
+            policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now) or self._unfiltered,
+            filtered=self.keeper is not None,
+            attitude_error=told.attitude_error(reading.attitude),
+            heading_error=told.heading_error,
+            missed_deadlines=len(self._overdue),
+            accelerometer_problem=told.accelerometer_problem(mode),
+            force=told.inertial.force,
+            motion_problem=told.motion_problem(mode),
+            buried=flight.blind and told.inertial.buried(flight.home, now),
+            stands=told.inertial.touch.stands(now),
+            deaf=not told.inertial.touch.tells(now) and now - self._heard_since > DEAF_S,
+        )
+
+    def _blindness(self, now: float) -> str | None:
+        """Why a policy that sees must not act on the newest images. None: it may."""
+        return next((problem for seen in self.seen if (problem := seen.problem(now))), None)
+
+    @property
+    def _unfiltered(self) -> str | None:
+        """Why the filter cannot keep a policy inside the fence. None: it can, or there is no filter."""
+        return None if self.keeper is None else self.keeper.problem
+
+    def _feel(self, now: float, reading: Reading) -> None:
+        """Process the inertial sensors. In the air they teach the throttle map and propagate the velocity."""
+        flight, inputs = self.flight, self.inputs
+        attitude = self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
+        if (reply := reading.fresh.get(RawImu.CODE)) is not None:
+            flying = self.flying and abs(self.height) > LIFTED and inputs.armed
+            seen = inputs.seen if flying and not flight.misled else None
+            late = self._late(reply, now)
+            asked = reply.time - late
+            known = now - self._broken > ANEW_S and not self.client.steered(now)
+            acts = known and self.client.delivered(asked - ACTING_S, asked) and not reading.failsafe
+            came = known and self.client.delivered(min(self.estimate.inertial.time, asked), asked, RARELY_S)
+            sent = None if reading.failsafe else self._history.felt(asked)
+            before = [throttle for lag in LAGS if (throttle := self._history.felt(asked - lag)) is not None]
+            measured = Measurement(
+                np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
+                None if sent is None else self.map.expected(sent, inputs.voltage),
+                tuple(self.map.force(t, inputs.voltage) for t in before) if len(before) == len(LAGS) else (),
+                asked,
+                acts=acts, delivered=came,
+                standing=flight.mode is Mode.INIT and not inputs.armed,
+                flying=flying and flight.mode is not Mode.TAKEOFF,
+                climb=None if seen is None else float(seen.velocity[2]),
+            )  # fmt: skip
+            if self.keeper is not None:
+                self.keeper.feel(measured.gyro, asked)
+            self.estimate = estimate.feel(self.estimate, measured, asked + late / 2, flight.mode, now)
+            if (force := self.estimate.inertial.force) is not None:
+                self.imu = Imu(measured.gyro, force)
+                if sent is not None and acts and flying and not flight.blind:
+                    swing = self._history.swing(asked)
+                    self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
+
+        def lift(throttle: float | None) -> tuple[float, float] | None:
+            if throttle is None or not self.flying or reading.failsafe:
+                return None
+            thrust, doubt = self.map.expected(throttle, inputs.voltage)
+            stood = flight.mode is Mode.TAKEOFF and self.height < LIFTED
+            return (max(thrust, GRAVITY) if stood else thrust), doubt  # what is missing, the ground gives
+
+        told = inertial.carry(
+            self.estimate.inertial, self._attitude(now, ATTITUDE_S), lift(self._history.felt(now)), now,
+            rate=self.sent.rate, held=lift(self._held.throttle), held_rate=self._held.rate,
+        )  # fmt: skip
+        self.estimate = dataclasses.replace(self.estimate, inertial=told)
+
+    def _decide(self, now: float, slack: float) -> None:
+        """Call the policy if it flies, step the state machine, and let a policy that takes over act at once."""
+        worker, odometry = self.worker, self.inputs.odometry
+        good = odometry is not None and not self.inputs.odometry_problem
+        if self.flight.mode is Mode.POLICY and worker is not None and good and odometry is not None:
+            self._ask(worker, now, slack, odometry)
+        elif self.flight.mode is Mode.HOVER:
+            problem = "none is loaded" if worker is None else self.inputs.policy_problem
+            if worker is not None and good and odometry is not None:
+                problem = problem or worker.readiness(odometry, now)
+            self.inputs = dataclasses.replace(self.inputs, policy_problem=problem)
+        self._step(now)
+        if worker is None:
+            return
+        if self.flight.mode is Mode.POLICY and worker.state is None:
+            assert odometry is not None
+            worker.start(odometry, now)
+            self._ask(worker, now, slack, odometry)
+            if worker.problem:
+                self._step(now)
+        if self.flight.mode is not Mode.POLICY:
+            worker.stop()
+
+    def _ask(self, worker: Worker, now: float, slack: float, odometry: Odometry) -> None:
+        if self._blindness(now) is None:
+            frames = [seen.frame for seen in self.seen if seen.frame is not None]
+            images = [frame.image.astype(np.float32) for frame in frames]
+            if worker.step(odometry, now, slack, self.imu, images) and self.log is not None:
+                record_policy(self.log, now, worker, [now - frame.time for frame in frames])
+        self.inputs = dataclasses.replace(
+            self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,
+            policy_lands=worker.lands,
+        )  # fmt: skip
+
+    def _step(self, now: float) -> None:
+        before = self.flight
+        self.flight = state_machine.step(self.settings, before, self.inputs, now)
+        self.estimate = estimate.enter(self.estimate, before, self.flight)
+        if self.flight.mode is not before.mode:
+            self.trim = 0.0 if self.flight.mode in (Mode.TAKEOFF, Mode.LAND) else self.trim
+            self._hovering = self.hover.begin()
+            if self.log is not None:
+                record_mode(self.log, now, before, self.flight)
+
+    def _command(self, now: float, dt: float) -> tuple[str, Ctbr | None]:
+        """The source of the command, and the command. None: the throttle is closed."""
+        flight, odometry, decision = self.flight, self.odometry, self.decision
+        if flight.mode in GROUNDED:
+            return "closed", None
+        if decision is not None and self.worker is not None:
+            assert odometry is not None
+            return self.worker.name, controlled(self.vehicle, decision.mode, odometry, decision.command)
+        if flight.target is None or odometry is None or flight.blind:
+            attitude = self._attitude(now, BLIND_ATTITUDE_S)
+            command, self.trim, told = guidance.descend(flight, self.estimate.inertial, attitude, self.trim, now, dt)
+            self.estimate = dataclasses.replace(self.estimate, inertial=told)
+            return "blind", command
+        if self.inputs.link_problem and self.inputs.silent and has_stood(self.settings, flight, odometry):
+            return "closed", None
+        seen = self._motion(now, odometry)
+        command, self._hovering, self.trim = guidance.hover(
+            self.hover, self._hovering, flight, flight.target, seen, self._under_way, self.trim, dt,
+            silent=self.inputs.silent,
+        )  # fmt: skip
+        return "hover", command
+
+    def _attitude(self, now: float, oldest: float) -> Attitude | None:
+        """The controller's attitude when the next command acts: the newest one, turned by what was sent since. None: it
+        came more than `oldest` s ago.
+        """
+        reply = self.client.latest.get(AttitudeReply.CODE)
+        if reply is None or now - reply.time > oldest:
+            return None
+        attitude, asked = reply.message, reply.time - self._late(reply, now)
+        for (time, rate), (until, _) in pairwise((*self._turns, (now, (0.0, 0.0, 0.0)))):
+            attitude = turned(attitude, rate, until - max(time, asked)) if until > asked else attitude
+        return attitude
+
+    def _late(self, reply: Reply, now: float) -> float:
+        """How long ago a reply was asked for when it came, s."""
+        return min(reply.latency, self.client.quickest) if self.client.lossy(now) else reply.latency
+
+    def _motion(self, now: float, odometry: Odometry) -> Seen:
+        """The inputs of the hover controller."""
+        inertial, told = self.estimate.inertial, self.client.message(MotorTelemetry.CODE, now, FRESH_S)
+        force = inertial.force if now - inertial.time < FRESH_S else None
+        return Seen(
+            Vec3(*odometry.position.tolist()), Vec3(*odometry.velocity.tolist()), Quat(*odometry.quaternion.tolist()),
+            Vec3(*odometry.body_rate.tolist()),
+            force=None if force is None else Vec3(*force.tolist()),
+            age=max(now - odometry.time, 0.0),
+            thrust=None if told is None else thrust_of(self.vehicle, told.speed),
+        )  # fmt: skip
+
+    def _kept(self, now: float, source: str, command: Ctbr | None) -> tuple[str, Ctbr | None]:
+        """The command after the filter. If the filter fails, it is a command to stop, and the next step ends the
+        policy's flight.
+        """
+        keeper, flight, odometry = self.keeper, self.flight, self.odometry
+        if keeper is None:
+            return source, command
+        keeper.problem = None if flight.mode in GROUNDED else keeper.problem
+        keeper.see(odometry, now, flying=self.flying and self.height > LIFTED and not flight.misled)
+        if self.decision is not None and command is not None and odometry is not None:
+            command = keeper.keep(odometry, now, command, floor=not self.inputs.policy_lands)
+            if command is None:
+                stop = (0.0, 0.0, 0.0, yaw_of(odometry.quaternion))
+                source, command = "hover", controlled(self.gentle, "velocity", odometry, stop)
+        keeper.sent(command, now)
+        return source, command
+
+    def _send(self, now: float, source: str, command: Ctbr | None) -> Sent:
+        if command is None:
+            sent = Sent(source, None, 0.0, self._closed())
+        else:
+            throttle = self.map.throttle(float(command.thrust), self.inputs.voltage)
+            stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), rates_of(command), ())
+            sent = Sent(source, command, throttle, stick.channels, stick.saturated)
+        acts = sent if self.client.set_raw_rc(set_raw_rc(sent.channels), now) else self._held
+        self._history.add(now, acts.throttle)
+        self._turns.append((now, acts.rate))
+        return sent
+
+    def _closed(self) -> tuple[int, ...]:
+        """The channels with the throttle closed. Before arming, the other sticks differ slightly from their centre, for
+        the probe.
+        """
+        apart = (0, 0, 0) if self.inputs.armed or self.probe.seen else PROBE
+        return self.sticks.arrange((*(self.sticks.centre + offset for offset in apart), CLOSED), ())
+
+    def _record(self, log: Log, now: float, reading: Reading) -> None:
+        if self.odometry is not None and self.inputs.odometry_problem is None:
+            record_odometry(log, now, self.odometry)
+        if self.keeper is not None and self.keeper.change is not None:
+            record_filter(log, now, self.keeper.change)
+        record_sent(log, now, self.sent, str(self.flight.mode), *self.setpoint)
+        for code, reply in reading.fresh.items():
+            record_message(log, self.info, code, reply, self.imu)
+        if self._ticks % 20 == 0:
+            record_map(log, now, self.map)
+        if self._ticks % 50 == 0:
+            record_link(log, now, self.client)

@@ -1,0 +1,202 @@
+"""An excitation flight in place of a policy. It observes and commands as a policy does, and the bridge flies it as one.
+
+It consists of a contract, an `act` and a course. The modes, fence, guard, watchdog and the pilot's switch are the same
+as for every policy.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from e2efly import __version__
+from e2efly.config.numbers import SPEED, check_fields, number
+from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
+from e2efly.control.manoeuvres import DURATION, TILT, Progress, Room, excite, length_for, softened
+from e2efly.flight.betaflight.client import SCHEDULE
+from e2efly.flight.betaflight.messages import Motor, RawImu
+from e2efly.flight.pilot.hover import FlightMotion, flight_gains
+from e2efly.flight.settings import FlightSettings
+from e2efly.policy.contract import CONTRACT_VERSION, Action, Contract
+from e2efly.policy.goal import Course, Goal, Observed, Outcome
+from e2efly.policy.observation import ATTITUDE, VELOCITY, Field
+from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+NAME = "excitation"
+"""The name on the command line and in the contract."""
+CONTROL_RATE = 100.0
+"""The rate at which it acts, Hz."""
+EXCITATION_SCHEDULE = SCHEDULE | {RawImu.CODE: 100.0, Motor.CODE: 100.0}
+"""The highest rate at which each message is requested, Hz. Inertia and motor lag show only in the gyroscope and the
+motor outputs."""
+MARGIN, FLOOR = 0.3, 0.6
+"""The distance that it keeps to the inside of the fence, m, and its lowest height over the ground, m."""
+SLOWEST, LEAST_HEIGHT = 1.2, 1.0
+"""The fence must have room for lines of this speed, m/s, and this height inside the margins, m."""
+BRAKING, REACTION = 3.5, 0.45
+"""The deceleration that its turns assume, m/s^2, and the time before it acts, s, unless the fence's values are
+worse."""
+PULSED = 0.45
+"""The tilt that doublets and chirps may add to the tilt for steering, rad."""
+LEAST_TILT = 0.3
+"""The smallest tilt that must remain for steering below the fence's tilt, rad."""
+QUICK = 0.8
+"""The share of the fence's speed that is flown."""
+_ELAPSED = Field("elapsed", 1, "none", "s", 1.0, "time since the beginning")
+_PLACE = Field("place", 3, "world", "m", 1.0, "position of the centre of mass")
+
+
+@dataclass(frozen=True)
+class ExcitationOptions:
+    """Options of an excitation flight."""
+
+    seconds: float = number(DURATION, low=10.0, high=300.0)
+    """Duration, s."""
+    speed: float = number(5.0, above=0, high=SPEED)
+    """Speed of the fastest line, m/s. The fence's room and its speed may allow less."""
+
+
+@dataclass(frozen=True)
+class ExcitationGoal(Goal):
+    """Provides the time and the position, and judges nothing. The duration of the course ends it."""
+
+    observation: ClassVar[tuple[Observed, ...]] = (
+        (_ELAPSED, lambda goal, memory, time, state: time[:, None]),
+        (_PLACE, lambda goal, memory, time, state: state.position),
+    )
+    config: ExcitationOptions
+    middle: np.ndarray
+    """(3,) middle of the room, m."""
+
+    def goal(self, memory: Any, time: Any) -> Any:
+        """The middle of the room."""
+        return np.broadcast_to(self.middle, (len(time), 3))
+
+    def advance(self, memory: Any, before: Any, after: Any, time: Any, timed_out: Any) -> tuple[Any, Outcome]:
+        """Never ends the flight by itself."""
+        no, off = np.zeros(len(time), bool), np.linalg.norm(after.position - self.middle, axis=-1)
+        return memory, Outcome(terminated=no, success=timed_out, arrived=no, crashed=no, error=off)
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Acts as a policy does. Create it with `excitation`."""
+
+    contract: Contract
+    """What it observes and commands."""
+    vehicle: Vehicle
+    """The vehicle with the gains for steering."""
+    room: Room
+    """The room in which it stays."""
+    speed: float
+    """Speed of its fastest line, m/s."""
+    seconds: float
+    """Duration, s."""
+
+    def act(
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The action for an observation, and the memory for the next call.
+
+        Args:
+            observation: (o,) as `contract.observation` defines it.
+            images: not used.
+            memory: what the last call returned. None: the flight begins here.
+
+        Returns:
+            The action, float32 (4,) in [-1, 1], and the memory for the next call, float64 (memory_size,).
+
+        Raises:
+            ValueError: if the observation has a number that is not finite.
+        """
+        del images
+        if not np.isfinite(observation).all():
+            raise ValueError(f"observation is {observation.tolist()}; accepted: finite numbers")
+        seen = {name: np.asarray(observation[part], np.float64) for name, part in self.contract.slices.items()}
+        place, attitude = seen[_PLACE.name], Quat(*seen[ATTITUDE.name])
+        motion = FlightMotion(Vec3(*place), Vec3(*seen[VELOCITY.name]), attitude)
+        before = Progress.begin(self.room, place, float(attitude.yaw())) if memory is None else _progress(memory)
+        after, command = excite(
+            self.vehicle, self.room, self.speed, self.seconds, before, float(seen[_ELAPSED.name][0]), motion
+        )
+        wanted = np.array([command.thrust, command.rate.x, command.rate.y, command.rate.z], np.float64)
+        return self.contract.action.asking(wanted), _memory(after)
+
+
+def excitation(
+    vehicle: Vehicle, settings: FlightSettings, options: ExcitationOptions, latency: float | None = None
+) -> tuple[Excitation, Course]:
+    """An excitation flight inside a fence, and its course, for `Runtime.of`.
+
+    Args:
+        vehicle: the loaded vehicle that the bridge uses.
+        settings: the flight's settings, for its fence and the height of the ground.
+        options: the options of the excitation flight.
+        latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
+
+    Raises:
+        ValueError: naming the option, or the part of the fence that is too small, and what is needed.
+    """
+    check_fields(NAME, options)
+    room, tilt = room_of(settings)
+    late: float = vehicle.latency if latency is None else latency
+    steer = softened(flight_gains(vehicle, late), tilt)
+    speed = min(options.speed, QUICK * settings.fence.speed)
+    acts = Excitation(_contract(vehicle, late), steer, room, speed, options.seconds)
+    goal = ExcitationGoal(options, (room.low + room.high) / 2)
+    return acts, Course(goal, np.zeros(1), goal.middle, duration=options.seconds)
+
+
+def room_of(settings: FlightSettings) -> tuple[Room, float]:
+    """The room in which an excitation flight stays inside a fence, and the largest tilt for steering, rad.
+
+    Raises:
+        ValueError: naming the part of the fence that is too small, and what is needed.
+    """
+    fence = settings.fence
+    low, high = np.add(fence.low, MARGIN), np.subtract(fence.high, MARGIN)
+    low[2] = max(low[2], settings.ground_height + FLOOR)
+    braking, reaction = min(BRAKING, fence.braking), max(REACTION, fence.reaction)
+    least = [length_for(SLOWEST, braking, reaction)] * 2 + [LEAST_HEIGHT]
+    for axis, under, over, room, needed in zip("xyz", fence.low, fence.high, high - low, least, strict=True):
+        if room < needed:
+            inside = f"{MARGIN:g} m inside it" + (f" and {FLOOR:g} m over the ground" if axis == "z" else "")
+            raise ValueError(
+                f"flight.fence.low and flight.fence.high are {under:g} and {over:g} in {axis}, which leaves "
+                f"{max(room, 0.0):.2g} m {inside}; accepted for {NAME}: {needed:.2g} m or more there"
+            )
+    if fence.speed * QUICK < SLOWEST:
+        raise ValueError(f"flight.fence.speed is {fence.speed:g}; accepted for {NAME}: {SLOWEST / QUICK:g} m/s or more")
+    if fence.tilt < LEAST_TILT + PULSED:
+        raise ValueError(
+            f"flight.fence.tilt is {fence.tilt:g}; accepted for {NAME}: {LEAST_TILT + PULSED:g} rad or more"
+        )
+    return Room(low, high, braking, reaction), min(TILT, fence.tilt - PULSED)
+
+
+def _contract(vehicle: Vehicle, latency: float) -> Contract:
+    mode = COMMAND_MODES["ctbr"]
+    low, high = (tuple(map(float, limits)) for limits in command_limits(mode, vehicle))
+    action = Action(mode.name, mode.fields, mode.units, low, high)
+    hover = tuple(map(float, action.asking(np.array([GRAVITY, 0.0, 0.0, 0.0]))))
+    return Contract(
+        contract_version=CONTRACT_VERSION, e2efly_version=__version__, task=NAME, vehicle=vehicle.name,
+        vehicle_hash=vehicle.hash, control_rate_hz=CONTROL_RATE, latency_s=latency, latency_range_s=(latency, latency),
+        observation_latency_range_s=(0.0, 0.0), observation=(_ELAPSED, _PLACE, ATTITUDE, VELOCITY), images=(),
+        memory_size=_MEMORY, action=action, hover_action=hover,
+    )  # fmt: skip
+
+
+_MEMORY = 8
+
+
+def _memory(progress: Progress) -> np.ndarray:
+    p = progress
+    return np.array([*p.centre, p.yaw, p.leg, p.since, p.trim, p.time])
+
+
+def _progress(memory: np.ndarray) -> Progress:
+    yaw, leg, since, trim, time = (float(x) for x in memory[3:])
+    return Progress(np.asarray(memory[:3]), yaw, int(leg), since, trim, time)

@@ -1,0 +1,129 @@
+"""The path of the backup manoeuvre.
+
+The path is computed in the plane in which the thrust turns. There, the rate loop, the mixer and the rotors' lag give
+one angle and one thrust over time, both with the vehicle's own numbers. The effect of the thrust on the velocity
+follows by summation. After `turn.TURN` s the thrust points in the braking direction, and the rest of the path is in
+closed form.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from e2efly.flight.filter.arithmetic import SCALARS, Number
+from e2efly.flight.filter.backup import (
+    DIAGONAL,
+    REST_S,
+    THRUST_SHARE,
+    TILT_GAIN,
+    UNSEEN,
+    WAY_GAINS,
+    Backup,
+    Brake,
+    brake,
+)
+from e2efly.flight.filter.forecast import NOTHING, Motion, Residual
+from e2efly.vehicles.vehicle import GRAVITY
+
+
+class Way(NamedTuple):
+    """The path of the manoeuvre."""
+
+    px: tuple[Number, ...]
+    """Positions during the turn, at the moments of `SEEN`, world, m."""
+    py: tuple[Number, ...]
+    pz: tuple[Number, ...]
+    lz: tuple[Number, ...]
+    """Heights, m, if the battery becomes flat now ..."""
+    wz: Number
+    """... and the vertical velocity after the turn, m/s, at most 0: the speed of falling."""
+    speed2: Number
+    """Square of the largest speed on the path, (m/s)^2."""
+    vx: Number
+    """Velocity after the turn, m/s. Zero in an axis where braking would have reversed it."""
+    vy: Number
+    vz: Number
+
+
+def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
+    """The path of the manoeuvre from a state.
+
+    The manoeuvre turns in the plane of c and t of `Brake`, about an axis u. There the angle to t obeys the rate loop,
+    starting from the present rate about u; d(angle) is the direction. Rotation across that plane comes to rest by
+    itself. Of the distance `off` of the thrust from the plane, a share e still remains. The thrust therefore points
+    along d(angle) + e * off, with d(angle) = sin(angle) / sin(whole) c + sin(whole - angle) / sin(whole) t.
+    """
+    low, high = b.response.thrust
+    gain, motor_time, top, most = min(b.response.gain[:2]), b.response.motor_time, b.rate, k.thrust / k.share
+    spread, half = DIAGONAL * max(b.response.spread[:2]) * gain, (high - low) / 2
+    cx, cy, cz, tx, ty, tz = k.cx, k.cy, k.cz, k.tx, k.ty, k.tz
+    ux, uy, uz = cy * tz - cz * ty, cz * tx - cx * tz, cx * ty - cy * tx
+    sine = xp.sqrt(ux * ux + uy * uy + uz * uz + 1e-12)
+    whole = xp.arctan2(sine, cx * tx + cy * ty + cz * tz)
+    whole = xp.minimum(xp.maximum(whole, 1e-3), math.pi - 0.02)
+    rate = (k.wx * ux + k.wy * uy + k.wz * uz) / sine
+    angular = (k.ax * ux + k.ay * uy + k.az * uz) / sine
+    bx, by, bz = k.bx, k.by, k.bz
+    up = (ux * (by * tz - bz * ty) + uy * (bz * tx - bx * tz) + uz * (bx * ty - by * tx)) / sine
+    left = xp.arctan2(up, bx * tx + by * ty + bz * tz)
+    scale = 1.0 / xp.sin(whole)
+    a, d = xp.sin(left) * scale, xp.sin(whole - left) * scale
+    offx, offy, offz = bx - a * cx - d * tx, by - a * cy - d * ty, bz - a * cz - d * tz
+    root = xp.sqrt(m.f)
+    vb = vc = vt = pb = pc = pt = 0.0 * left
+    ox, oy, oz = air.x, air.y, air.z - GRAVITY
+    px, py, pz, lz, fastest = [], [], [], [], m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
+    vx, vy, vz = m.vx, m.vy, m.vz
+    flat, z = xp.minimum(xp.maximum(THRUST_SHARE / k.share, UNSEEN), 1.0), 0.0
+    for h, t, (a11, a12, a21, a22), kept, mean, square, still, seen in b.steps:
+        error = rate - xp.minimum(xp.maximum(TILT_GAIN * left, -top), top)
+        taken = spread * abs(error) + 1e-9
+        error = error * xp.minimum(half / taken, 1.0)
+        wanted = rate - error
+        after, then = a11 * error + a12 * angular, a21 * error + a22 * angular
+        turned = wanted * h - (motor_time * (then - angular) + (after - error)) / gain
+        taken = xp.minimum(taken, half)
+        goal = xp.sqrt(xp.minimum(xp.maximum(most * xp.cos(left), low + taken), high - taken))
+        rate, angular = wanted + after, then
+        middle, left = left - 0.5 * turned, left - turned
+        off = root - goal
+        push = k.share * (goal * goal + off * (2.0 * goal * mean + off * square))
+        root = goal + kept * off
+        a, d, e = push * scale * xp.sin(middle), push * scale * xp.sin(whole - middle), push * still
+        k2 = 0.5 * h * h
+        pb, pc, pt = pb + h * vb + k2 * e, pc + h * vc + k2 * a, pt + h * vt + k2 * d
+        vb, vc, vt = vb + h * e, vc + h * a, vt + h * d
+        if seen:
+            fall = 0.5 * t * t
+            x, y, z = pb * offx + pc * cx + pt * tx, pb * offy + pc * cy + pt * ty, pb * offz + pc * cz + pt * tz
+            free = m.pz + t * m.vz + fall * oz
+            px.append(m.px + t * m.vx + fall * ox + x)
+            py.append(m.py + t * m.vy + fall * oy + y)
+            pz.append(free + z)
+            lz.append(free + flat * z)
+            x, y, z = vb * offx + vc * cx + vt * tx, vb * offy + vc * cy + vt * ty, vb * offz + vc * cz + vt * tz
+            vx = m.vx + t * ox + x
+            vy = m.vy + t * oy + y
+            vz = m.vz + t * oz + z
+            fastest = xp.maximum(fastest, vx * vx + vy * vy + vz * vz)
+    wz = xp.minimum(vz - (1.0 - flat) * z, 0.0)
+    vx = xp.where(vx * k.vx > 0.0, vx, 0.0)
+    vy = xp.where(vy * k.vy > 0.0, vy, 0.0)
+    vz = xp.where(vz * k.vz > 0.0, vz, 0.0)
+    return Way(tuple(px), tuple(py), tuple(pz), tuple(lz), wz, fastest, vx, vy, vz)
+
+
+def stopping(b: Backup, speed: float) -> float:
+    """The distance in which level flight at a speed, m/s, comes to rest with the manoeuvre, from its first command on,
+    m.
+    """
+    m = Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING, gains=WAY_GAINS), NOTHING)
+    return max(*w.px, w.px[-1] + run_out(SCALARS, w.vx, b.braking[0]))
+
+
+def run_out(xp: Any, speed: Number, braking: Number) -> Number:
+    """The distance in which a speed, m/s, comes to rest, m: first with the deceleration `braking`, m/s^2, then with the
+    time constant `REST_S`.
+    """
+    slow = braking * REST_S
+    return xp.where(speed < slow, speed * REST_S, 0.5 * speed * speed / braking + 0.5 * slow * REST_S)

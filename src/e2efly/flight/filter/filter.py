@@ -1,0 +1,338 @@
+"""The filter: forecasts the vehicle over the delay, and changes a command only as much as the backup manoeuvre needs.
+
+A command passes unchanged, bit for bit, if the backup manoeuvre after it would still keep every limit: fence, floor,
+largest speed and tilt, solids. Otherwise it is moved towards the manoeuvre's own command by the smallest share that
+keeps them. This is a backup-controller barrier (Singletary et al., Onboard safety guarantees for racing drones, 2022;
+and Chen et al., Backup control barrier functions, 2021). The manoeuvre's path is in closed form where possible.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from e2efly.flight.filter.arithmetic import SCALARS, Number, clip
+from e2efly.flight.filter.backup import TIMING, Backup, axes_z, brake, command
+from e2efly.flight.filter.backup_path import stopping
+from e2efly.flight.filter.forecast import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
+from e2efly.flight.filter.margins import NAMES, Limits, against, near, retreat, rooms
+from e2efly.flight.settings import Fence
+from e2efly.policy.odometry import Odometry
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+
+HOLD = 0.01
+"""A command is judged as if it were held for this time, s."""
+HALVINGS = 3
+"""How many times the share of the change is halved: down to an eighth."""
+AIR_S, AIR_MOST = 0.4, 4.0
+"""The acceleration that the forecast does not explain is averaged over the first value, s, and is at most the second
+value per axis, m/s^2."""
+SHARE_S, SHARES = 0.2, (0.6, 1.3)
+"""The ratio of actual to commanded thrust is averaged over this time, s, and stays within these limits. It is only
+measured ..."""
+SHARE_SEEN = 4.0
+"""... while the commanded thrust is at least this, m/s^2."""
+LONGEST = 0.02
+"""The longest step of the forecast, s."""
+OLDEST = 0.5
+"""Commands that were sent longer ago than this no longer act, s."""
+FELT_S = 0.03
+"""The largest time between two gyro replies from which the angular acceleration is computed, s."""
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The vehicle, the limits and the latency for which commands are filtered. Create it with `Filter.of`."""
+
+    backup: Backup
+    limits: Limits
+    latency: float
+    """The time from the vehicle's motion to its rate loop, s."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, fence: Fence, latency: float | None = None) -> "Filter":
+        """The filter for a loaded vehicle in a fence.
+
+        Raises:
+            ValueError: naming the field, for a vehicle that cannot brake or a fence in which it could not stop.
+        """
+        backup = Backup.of(vehicle, fence.tilt)
+        limits = Limits.of(fence, float(vehicle.radius), backup.margin)
+        filter = Filter(backup, limits, float(vehicle.latency if latency is None else latency))
+        _check(filter, fence)
+        return filter
+
+
+def stopping_distance(filter: Filter, speed: float) -> float:
+    """The distance to a wall, m, that level flight at a speed, m/s, needs to stop: for the delay, the manoeuvre and the
+    margin.
+    """
+    return speed * (filter.latency + TIMING) + stopping(filter.backup, speed) + filter.backup.margin
+
+
+def stopping_height(filter: Filter, speed: float) -> float:
+    """The height between floor and ceiling, m, that level flight at a speed, m/s, needs to stop, with both margins."""
+    b, m = filter.backup, Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    here = (0.0, 0.0, 0.0)
+    left = rooms(SCALARS, b, Limits(here, here, speed, math.inf), m, NOTHING)
+    return 2 * b.margin - left[NAMES.index("floor")] - left[NAMES.index("ceiling")]
+
+
+def _check(filter: Filter, fence: Fence) -> None:
+    sizes = [high - low for low, high in zip(fence.low, fence.high, strict=True)]
+    for size, needed, what in (
+        (sizes[0], stopping_distance, "long in x"),
+        (sizes[1], stopping_distance, "long in y"),
+        (sizes[2], stopping_height, "high"),
+    ):
+        if size < (least := needed(filter, fence.speed)):
+            fastest = _fastest(filter, needed, size, fence.speed)
+            accepted = "a larger fence" if fastest is None else f"up to {fastest:.1f} m/s, or a larger fence"
+            raise ValueError(
+                f"guard 'filter': flight.fence.speed is {fence.speed:g} m/s, from which the vehicle stops within "
+                f"{least:.1f} m, and the fence is {size:g} m {what}; accepted: {accepted}"
+            )
+
+
+def _fastest(filter: Filter, needed: Callable[[Filter, float], float], size: float, below: float) -> float | None:
+    """The largest speed below `below`, m/s, from which the vehicle stops within a size, m, in steps of 0.1. None: no
+    speed does.
+    """
+    speeds = [tenth / 10 for tenth in range(1, math.ceil(10 * below))]
+    return max(itertools.takewhile(lambda speed: needed(filter, speed) <= size, speeds), default=None)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the filter remembers from step to step."""
+
+    sent: tuple[tuple[float, Command], ...] = ()
+    """When each command was sent, s, and the command, which holds until the next one. Oldest first."""
+    actuators: Actuators | None = None
+    """The state of the rotors at the newest odometry, from the commands that act by then. None: no command was sent."""
+    stamp: float = -math.inf
+    """Time of the newest odometry, s."""
+    velocity: tuple[Number, Number, Number] | None = None
+    """Its velocity, world, m/s."""
+    since: float = 0.0
+    """When it arrived, s."""
+    air: Residual = NOTHING
+    """What the forecast does not explain."""
+    felt: tuple[tuple[float, tuple[float, float, float]], ...] = ()
+    """When each reading of the flight controller's gyro was requested, s, and its body rate, rad/s. Oldest first."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """The result of filtering a command."""
+
+    command: Command
+    share: Number
+    """Share of the change towards the manoeuvre's command. 0: the command passed unchanged."""
+    room: Number
+    """The smallest room that the manoeuvre would have left after the wanted command, m. NaN if a number is not
+    finite."""
+    limit: Any
+    """The index of that limit in `room.NAMES`. Indices beyond it refer to `solids`."""
+    solids: tuple[str, ...] = ()
+    """Names of the nearby solids."""
+
+    @property
+    def name(self) -> str:
+        """Name of that limit. Only for a single vehicle."""
+        return (*NAMES, *self.solids)[self.limit]
+
+
+def remember(memory: Memory, sent: Command, now: float) -> Memory:
+    """The memory after a command was sent. Sending the same command again changes nothing."""
+    kept = memory.sent
+    if kept and isinstance(sent.thrust, float) and kept[-1][1] == sent:
+        return memory
+    while len(kept) > 1 and kept[1][0] < now - OLDEST:
+        kept = kept[1:]
+    return replace(memory, sent=(*kept, (now, sent)))
+
+
+def feel(memory: Memory, rate: tuple[float, float, float], asked: float) -> Memory:
+    """The memory after a gyro reading, rad/s, that was requested at the control step of `asked` s."""
+    kept = tuple(one for one in memory.felt if asked - OLDEST < one[0] < asked)
+    return replace(memory, felt=(*kept, (asked, rate)))
+
+
+def watch(filter: Filter, memory: Memory, odometry: Odometry, now: float, *, flying: bool) -> Memory:
+    """The memory after the newest odometry, which may be the same as before.
+
+    Args:
+        filter: the filter.
+        memory: the memory so far.
+        odometry: position, velocity (*n, 3), quaternion (*n, 4), body rate (*n, 3).
+        now: s.
+        flying: whether only the air carries the vehicle.
+    """
+    if odometry.time == memory.stamp or not memory.sent:
+        return memory
+    v = odometry.velocity
+    xp, velocity = _apart(v)
+    before = memory.actuators
+    if before is None:
+        zero = 0.0 * velocity[0]
+        before = Actuators(zero, zero, zero, zero, zero, zero + GRAVITY)
+    after = before
+    for c, h in _between(memory.sent, memory.since - filter.latency, now - filter.latency):
+        after = actuated(xp, filter.backup.response, after, c, h)
+    air = memory.air
+    dt = odometry.time - memory.stamp
+    if not flying:
+        air = NOTHING
+    elif memory.velocity is not None and 0.0 < dt < 0.1:
+        axis = axes_z(*_apart(odometry.quaternion)[1])
+        air = _felt(xp, air, memory.velocity, velocity, axis, 0.5 * (before.f + after.f), dt)
+    return replace(memory, actuators=after, stamp=odometry.time, velocity=velocity, since=now, air=air)
+
+
+def _felt(
+    xp: Any,
+    air: Residual,
+    v0: tuple[Number, ...],
+    v1: tuple[Number, ...],
+    axis: tuple[Number, ...],
+    f: Number,
+    dt: float,
+) -> Residual:
+    """The unexplained part of a change of velocity in dt s: along the thrust as its share, across the thrust as the
+    air's push.
+    """
+    bx, by, bz = axis
+    thrust = air.share * f
+    ex = (v1[0] - v0[0]) / dt - thrust * bx - air.x
+    ey = (v1[1] - v0[1]) / dt - thrust * by - air.y
+    ez = (v1[2] - v0[2]) / dt - thrust * bz - air.z + GRAVITY
+    along = ex * bx + ey * by + ez * bz
+    k, seen = min(dt / AIR_S, 1.0), f > SHARE_SEEN
+    change = xp.where(seen, min(dt / SHARE_S, 1.0) * along / xp.maximum(f, SHARE_SEEN), 0.0)
+    return Residual(
+        clip(xp, air.x + k * (ex - along * bx), -AIR_MOST, AIR_MOST),
+        clip(xp, air.y + k * (ey - along * by), -AIR_MOST, AIR_MOST),
+        clip(xp, air.z + k * (ez - along * bz), -AIR_MOST, AIR_MOST),
+        clip(xp, air.share + change, *SHARES),
+    )
+
+
+def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> Motion:
+    """The state at which a command that is sent now begins to act."""
+    xp, (px, py, pz) = _apart(odometry.position)
+    _, (vx, vy, vz) = _apart(odometry.velocity)
+    _, (qw, qx, qy, qz) = _apart(odometry.quaternion)
+    _, (wx, wy, wz) = _apart(odometry.body_rate)
+    a = memory.actuators
+    ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
+    m = Motion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
+    begin, before = memory.since - filter.latency, None
+    felt = [one for one in memory.felt if begin < one[0] <= now]
+    for at, rate in (*felt, (now, None)):
+        for c, h in _between(memory.sent, begin, at):
+            m = moved(xp, filter.backup.response, m, c, memory.air, h)
+        if rate is not None:
+            m, begin, before = _turning(m, rate, at, before), at, (at, rate)
+    return m
+
+
+def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> Motion:
+    """The state with the measured body rate, and with the angular acceleration since the previous gyro reading."""
+    ax, ay = m.ax, m.ay
+    if before is not None and 0.0 < at - before[0] < FELT_S:
+        ax, ay = ((rate[i] - before[1][i]) / (at - before[0]) for i in range(2))
+    return m._replace(wx=rate[0], wy=rate[1], wz=rate[2], ax=ax, ay=ay)
+
+
+def filtered(
+    filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Command, *, floor: bool = True
+) -> Filtered:
+    """The command nearest to the wanted one that keeps all limits.
+
+    Args:
+        filter: the filter.
+        memory: the memory after `watch`.
+        odometry: the newest odometry.
+        now: s.
+        wanted: thrust over mass and body rates, floats or (n,) each, within the vehicle's limits.
+        floor: whether the lowest height of the fence counts.
+    """
+    xp = _apart(odometry.position)[0]
+    b, r, air = filter.backup, filter.backup.response, memory.air
+    m = forecast(filter, memory, odometry, now)
+    solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
+
+    def left(c: Command) -> tuple[Number, ...]:
+        after = moved(xp, r, m, c, air, HOLD)
+        return rooms(xp, b, filter.limits, after, air, solids, floor, m)
+
+    found = left(wanted)
+    names = tuple(plane.name for plane in solids)
+    if xp is SCALARS and min(found) >= 0.0:
+        return Filtered(wanted, 0.0, *_worst(xp, found), names)
+    back = retreat(xp, filter.limits, m, floor)
+    own = command(xp, b, m, brake(xp, b, m, against(xp, m, air), back))
+    short, limit = _worst(xp, found)
+    share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)
+    passes = short >= 0.0
+    share = xp.where(passes, 0.0, share)
+    given = Command(*(
+        xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
+    ))  # fmt: skip
+    return Filtered(given, share, short, limit, names)
+
+
+def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
+    """The smallest room, and the index of its limit."""
+    if xp is SCALARS:
+        least = min(rooms)
+        return least, rooms.index(least)
+    stacked = xp.stack(rooms)
+    return stacked.min(axis=0), stacked.argmin(axis=0)
+
+
+def _least(xp: Any, spare: Any, zero: Number) -> Number:
+    """The smallest share, in eighths, by which a command must be changed so that enough room is left. 1 if no smaller
+    share is enough.
+    """
+    low, high = zero, zero + 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        good = spare(middle) >= 0.0
+        low, high = xp.where(good, low, middle), xp.where(good, middle, high)
+    return high
+
+
+def _between_two(a: Command, b: Command, share: Number) -> Command:
+    return Command(*(x + share * (y - x) for x, y in zip(a, b, strict=True)))
+
+
+def _between(sent: tuple[tuple[float, Command], ...], begin: float, end: float) -> list[tuple[Command, float]]:
+    """The commands that held from `begin` to `end`, s, and for how long. Before the first command, the first one
+    counts.
+    """
+    parts: list[tuple[Command, float]] = []
+    for i, (at, c) in enumerate(sent):
+        start = begin if i == 0 else max(at, begin)
+        stop = min(sent[i + 1][0], end) if i + 1 < len(sent) else end
+        if (whole := stop - start) > 1e-6:
+            count = max(math.ceil(whole / LONGEST - 1e-6), 1)
+            parts += [(c, round(whole / count, 5))] * count
+    return parts
+
+
+def _reach(m: Motion) -> float:
+    """Solids farther away than this do not matter for any manoeuvre, m."""
+    speed = math.sqrt(m.vx**2 + m.vy**2 + m.vz**2)
+    return 2.0 + speed + 0.2 * speed**2
+
+
+def _apart(rows: Any) -> tuple[Any, tuple[Number, ...]]:
+    """The functions to compute with, and the components: floats for an array (k,), arrays (n,) for an array (n, k)."""
+    if rows.ndim == 1:
+        return SCALARS, tuple(rows.tolist())
+    import numpy as np
+
+    return np, tuple(rows[:, i] for i in range(rows.shape[1]))

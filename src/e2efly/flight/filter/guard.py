@@ -1,0 +1,106 @@
+"""The filter as the bridge uses it, with the command and odometry types of the rest of `deploy`."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.control import Ctbr, Vec3
+from e2efly.flight.filter.filter import Filter, Memory, feel, filtered, remember, watch
+from e2efly.flight.filter.forecast import Command
+from e2efly.policy.odometry import Odometry
+
+
+@dataclass(frozen=True)
+class Change:
+    """How the filter changed a command."""
+
+    limit: str
+    """The limit that would not have been kept: a name of `room.NAMES`, or of a solid."""
+    room: float
+    """The room to that limit that the backup manoeuvre would have left after the wanted command, m. Negative: beyond
+    it."""
+    share: float
+    """How far it was changed towards the manoeuvre's command, 0 to 1."""
+    wanted: Ctbr
+    """The command as it came from the policy."""
+
+
+class FilterError(Exception):
+    """The filter has no command, because a number is not finite."""
+
+
+def keep(
+    filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
+) -> tuple[Ctbr, Change | None]:
+    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits.
+
+    Args:
+        filter: the filter for this vehicle and fence.
+        memory: the memory after `watch`.
+        odometry: the newest odometry.
+        now: s.
+        wanted: the command of the policy.
+        floor: whether the lowest height of the fence counts.
+
+    Raises:
+        FilterError: if a number is not finite.
+    """
+    told = Command(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
+    try:
+        found = filtered(filter, memory, odometry, now, told, floor=floor)
+    except (ValueError, ArithmeticError) as error:
+        raise FilterError(f"filter: {error}") from error
+    if not all(map(math.isfinite, (*found.command, found.room))):
+        raise FilterError(f"filter: its command is {tuple(found.command)}; accepted: finite numbers")
+    if found.share == 0.0:
+        return wanted, None
+    thrust, x, y, z = found.command
+    return Ctbr(thrust, Vec3(x, y, z)), Change(found.name, found.room, found.share, wanted)
+
+
+def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:
+    """The memory after a command was sent. None: the throttle was closed."""
+    if command is None:
+        return remember(memory, Command(0.0, 0.0, 0.0, 0.0), now)
+    rate = command.rate
+    return remember(memory, Command(*(float(n) for n in (command.thrust, rate.x, rate.y, rate.z))), now)
+
+
+class Keeper:
+    """The filter in flight: its memory, its last change, and why it has failed."""
+
+    def __init__(self, filter: Filter) -> None:
+        """Filter for a vehicle in a fence."""
+        self.filter, self.memory = filter, Memory()
+        self.change: Change | None = None
+        """How the newest command was changed. None: not at all."""
+        self.problem: str | None = None
+        """Why it cannot filter. No policy flies then until the vehicle is on the ground. None: it can."""
+
+    def see(self, odometry: Odometry | None, now: float, *, flying: bool) -> None:
+        """Process the newest odometry. `flying`: only the air carries the vehicle."""
+        self.change = None
+        if odometry is not None:
+            self.memory = watch(self.filter, self.memory, odometry, now, flying=flying)
+
+    def feel(self, rate: np.ndarray, asked: float) -> None:
+        """Process a reading of the flight controller's gyro, (3,) rad/s, that was requested at `asked` s."""
+        x, y, z = rate.tolist()
+        if all(map(math.isfinite, (x, y, z))):
+            self.memory = feel(self.memory, (x, y, z), asked)
+
+    def keep(self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool) -> Ctbr | None:
+        """The command in place of a policy's command, with the arguments of the function `keep`. None: it failed, and
+        `problem` says why.
+        """
+        try:
+            command, self.change = keep(self.filter, self.memory, odometry, now, wanted, floor=floor)
+        except FilterError as error:
+            self.problem = str(error)
+            return None
+        return command
+
+    def sent(self, command: Ctbr | None, now: float) -> None:
+        """Remember the command that was sent. None: the throttle was closed."""
+        self.memory = sent(self.memory, command, now)

@@ -1,0 +1,101 @@
+"""Where the vehicle may be: the fence, the guard that acts before it is reached, and targets that stay inside."""
+
+import math
+
+import numpy as np
+
+from e2efly.control import Quat, Vec3
+from e2efly.flight.pilot.flight_state import Pilot, Reason, Target
+from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
+from e2efly.vehicles.vehicle import GRAVITY
+
+MARGIN = 0.1
+"""How far inside the fence a policy's flight comes to rest, m."""
+RIGHTING = 8.0
+"""How fast a tilted vehicle becomes upright before it can brake, rad/s."""
+
+
+def fence_problem(
+    fence: Fence,
+    odometry: Odometry,
+    floor: bool = True,
+    *,
+    guard: bool = True,
+    age: float = 0.0,
+    force: np.ndarray | None = None,
+) -> str | None:
+    """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither.
+
+    Args:
+        fence: the fence.
+        odometry: the position and motion of the vehicle.
+        floor: whether the lowest height counts.
+        guard: whether it counts if the vehicle cannot stop inside.
+        age: how old the odometry is, s.
+        force: (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last. None: not known.
+    """
+    v = odometry.velocity
+    speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)
+    if speed > fence.speed:
+        return f"{Reason.OUTSIDE_FENCE}: {speed:.1f} m/s; accepted: {fence.speed:g}"
+    if tilt > fence.tilt:
+        return f"{Reason.OUTSIDE_FENCE}: tilt {math.degrees(tilt):.0f} deg; accepted: {math.degrees(fence.tilt):.0f}"
+    stops = _stop(fence, odometry, age, force)
+    for axis, at, stop, low, high in zip("xyz", odometry.position, stops, fence.low, fence.high, strict=True):
+        low = low if floor or axis != "z" else -math.inf
+        if not low <= at <= high:
+            return f"{Reason.OUTSIDE_FENCE}: {axis} is {at:.2f} m; accepted: {low:g} to {high:g}"
+        if guard and not low <= stop <= high:
+            return f"{Reason.GUARD}: {axis} would reach {stop:.2f} m; accepted: {low:g} to {high:g}"
+    return None
+
+
+def here(odometry: Odometry) -> Target:
+    """The position and heading of the vehicle."""
+    x, y, z = (float(value) for value in odometry.position)
+    return Target((x, y, z), yaw_of(odometry.quaternion))
+
+
+def stopping(fence: Fence, odometry: Odometry) -> Target:
+    """Where the vehicle can come to rest. Along an axis on which this is outside the fence, it is sent back by as much
+    as it needs to stop, so that it brakes as hard as it can. The target is always inside the fence.
+    """
+    stops = _stop(fence, odometry)
+    leaves = (stops < fence.low) | (stops > fence.high)
+    place = np.where(leaves, 2 * odometry.position - stops, stops)
+    x, y, z = np.clip(place, np.add(fence.low, MARGIN), np.subtract(fence.high, MARGIN)).tolist()
+    return Target((x, y, z), yaw_of(odometry.quaternion))
+
+
+def moved(settings: FlightSettings, target: Target, pilot: Pilot, dt: float) -> Target:
+    """The target moved by the sticks for `dt` s, relative to the target's heading. It never leaves the fence. If it is
+    outside, it does not move farther out.
+    """
+
+    def beyond(stick: float) -> float:
+        dead = settings.stick_deadband
+        return math.copysign(max(abs(stick) - dead, 0.0) / (1 - dead), stick)
+
+    reach = settings.reposition_speed * dt
+    forward, left, up = beyond(pilot.pitch) * reach, -beyond(pilot.roll) * reach, beyond(pilot.throttle) * reach
+    c, s = math.cos(target.yaw), math.sin(target.yaw)
+    at, fence = np.array(target.position), settings.fence
+    to = np.add(at, (c * forward - s * left, s * forward + c * left, up))
+    x, y, z = (float(p) for p in np.clip(to, np.minimum(fence.low, at), np.maximum(fence.high, at)))
+    return Target((x, y, z), math.remainder(target.yaw - beyond(pilot.yaw) * dt, math.tau))
+
+
+def _stop(fence: Fence, odometry: Odometry, age: float = 0.0, force: np.ndarray | None = None) -> np.ndarray:
+    """(3,) m: where the vehicle comes to rest, computed for each axis separately: at its present speed until it is
+    upright and the braking takes effect, then braking. A present acceleration that makes it faster lasts until then.
+    """
+    v, wait = odometry.velocity, age + fence.reaction + tilt_of(odometry.quaternion) / RIGHTING
+    if force is None:
+        gain = np.zeros(3)
+    else:
+        a = Quat(*odometry.quaternion.tolist()).rotate(Vec3(*force.tolist()))
+        gain = np.array([a.x, a.y, a.z - GRAVITY])
+        gain = wait * np.where(gain * v >= 0, gain, 0.0)
+    then = v + gain
+    return odometry.position + (v + gain / 2) * wait + then * np.abs(then) / (2 * fence.braking)

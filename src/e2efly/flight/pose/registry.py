@@ -1,0 +1,80 @@
+"""The pose sources by name. A source registers itself. A user's own source is given as a reference to its file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from e2efly.config.registry import Registry, check_methods
+from e2efly.flight.pose.pose_source import PoseSource
+
+METHODS = ("refused", "problem", "read", "close", "describe")
+"""What a pose source must have."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of pose source."""
+
+    open: Callable[[str], PoseSource]
+    """Opens a source, given the text after its name. Raises ValueError that says what is accepted."""
+    form: str
+    """How the text for the source is written."""
+
+
+SOURCES: Registry[Kind] = Registry("pose source", source=lambda kind: kind.open)
+"""The kinds of pose sources."""
+
+F = TypeVar("F", bound=Callable[[str], PoseSource])
+
+
+class MalformedError(ValueError):
+    """The text after the name of a source does not have the form that is required."""
+
+
+def register(name: str, form: str) -> Callable[[F], F]:
+    """Register a function or a class that opens a pose source, given the text after its name.
+
+    Args:
+        name: the name in `e2efly fly --pose NAME:...`.
+        form: how the whole text is written, for people.
+
+    Raises:
+        ValueError: if the name is taken.
+    """
+    return SOURCES.adding(name, lambda opener: Kind(opener, form))
+
+
+def opened(kind: Kind, text: str, where: str) -> PoseSource:
+    """Open a source of a kind.
+
+    Raises:
+        ValueError: naming the text and what is accepted, or naming the file of a source that lacks a method.
+    """
+    try:
+        source = kind.open(where)
+    except MalformedError:
+        raise ValueError(f"pose source is {text!r}; accepted: {kind.form}") from None
+    check_methods(source, METHODS)
+    return source
+
+
+def part_of(text: str) -> str:
+    """A part of a source's text that must not be empty.
+
+    Raises:
+        MalformedError: if it is empty.
+    """
+    if not text.strip():
+        raise MalformedError(text)
+    return text
+
+
+def port_of(text: str) -> int:
+    """A port number.
+
+    Raises:
+        MalformedError: if the text is not a port number.
+    """
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 65535):
+        raise MalformedError(text)
+    return int(text)

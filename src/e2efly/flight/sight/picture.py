@@ -1,0 +1,108 @@
+"""What a policy's network receives, shown to people: as a picture in the terminal, and as a PNG."""
+
+import struct
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.text import Text
+
+from e2efly.policy.images import Image
+
+HOLE = (90, 0, 60)
+"""Colour where depth has no value: red, green, blue, 0 to 255."""
+COLUMNS = 64
+"""The widest picture in the terminal, characters."""
+PIXELS = 512
+"""A PNG is enlarged by a whole number to about this width, pixels."""
+GAP = 2
+"""Gap between a picture and the pictures beside it, pixels."""
+
+
+def colours(image: np.ndarray, camera: Image) -> np.ndarray:
+    """An image as red, green and blue, (h, w, 3) uint8.
+
+    Depth is bright near and dark far, over the camera's reach, and `HOLE` where it is 0. Normals are mapped from [-1,
+    1] to [0, 1].
+
+    Args:
+        image: an image of the camera that `Image.check` accepts.
+        camera: the camera of the policy's contract.
+    """
+    low, high = camera.limits
+    share = np.clip((image - low) / (high - low), 0.0, 1.0)
+    if camera.sees in ("depth", "range"):
+        grey = np.round(255 * (1.0 - share)).astype(np.uint8)
+        return np.where((image > 0)[..., None], grey[..., None], np.array(HOLE, np.uint8))
+    shown = np.round(255 * share).astype(np.uint8)
+    return shown if shown.ndim == 3 else np.repeat(shown[..., None], 3, axis=2)
+
+
+def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
+    """A picture with others of the same size to its right, in two rows, after a gap.
+
+    Args:
+        shown: (h, w, 3) uint8.
+        others: (h, w, 3) uint8 each. If empty, the result is the picture alone.
+
+    Returns:
+        (h or 2 h, ..., 3) uint8. The picture is in the upper left.
+    """
+    if not len(others):
+        return shown
+    h, w, _ = shown.shape
+    rows = 1 if len(others) == 1 else 2
+    columns = -(-len(others) // rows)
+    whole = np.full((rows * h, GAP + (columns + 1) * w, 3), 255, np.uint8)
+    whole[:h, :w] = shown
+    for i, other in enumerate(others):
+        y, x = i // columns * h, GAP + (1 + i % columns) * w
+        whole[y : y + h, x : x + w] = other
+    return whole
+
+
+def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
+    """A picture for the terminal: each character is two pixels, one above the other.
+
+    Args:
+        pixels: (h, w, 3) uint8.
+        columns: its largest width, characters. A wider picture is reduced to every second, third, ... pixel.
+    """
+    step = -(-pixels.shape[1] // columns)
+    small = pixels[::step, ::step].astype(int)
+    text = Text()
+    for y in range(0, small.shape[0], 2):
+        for x in range(small.shape[1]):
+            upper = "rgb({},{},{})".format(*small[y, x])
+            under = " on rgb({},{},{})".format(*small[y + 1, x]) if y + 1 < small.shape[0] else ""
+            text.append("\u2580", upper + under)
+        text.append("\n" if y + 2 < small.shape[0] else "")
+    return text
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write a picture, enlarged (ISO/IEC 15948: 8 bits, colour type 2, no filter).
+
+    Args:
+        path: path of the file. Its folder is created.
+        pixels: (h, w, 3) uint8.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    times = max(PIXELS // pixels.shape[1], 1)
+    large = pixels.repeat(times, axis=0).repeat(times, axis=1)
+    height, width = large.shape[:2]
+    rows = np.concatenate([np.zeros((height, 1), np.uint8), large.reshape(height, -1)], axis=1)  # 0: no filter
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(rows.tobytes()))
+        + chunk(b"IEND", b"")
+    )

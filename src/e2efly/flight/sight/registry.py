@@ -1,0 +1,56 @@
+"""The image sources by name. A source registers itself. A user's own source is given as a reference to its file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from e2efly.config.registry import Registry, check_methods
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.policy.images import Image
+
+METHODS = ("problem", "read", "close", "describe")
+"""What an image source must have."""
+
+Opener = Callable[[str, Image], ImageSource]
+"""Opens a source, given the text after its name and the camera of the policy's contract, to which the source crops and
+resamples its images. Raises ValueError that says what is accepted."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of image source."""
+
+    open: Opener
+    """Opens a source."""
+    form: str
+    """How the text for the source is written."""
+
+
+SOURCES: Registry[Kind] = Registry("image source", source=lambda kind: kind.open)
+"""The kinds of image sources."""
+
+F = TypeVar("F", bound=Opener)
+
+
+def register(name: str, form: str) -> Callable[[F], F]:
+    """Register a function or a class that opens an image source, given the text after its name and the camera.
+
+    Args:
+        name: the name in `e2efly fly --image IMAGE=NAME:...`.
+        form: how the whole text is written, for people.
+
+    Raises:
+        ValueError: if the name is taken.
+    """
+    return SOURCES.adding(name, lambda opener: Kind(opener, form))
+
+
+def opened(kind: Kind, where: str, image: Image) -> ImageSource:
+    """Open a source of a kind.
+
+    Raises:
+        ValueError: naming the text and what is accepted, or naming the file of a source that lacks a method.
+    """
+    source = kind.open(where, image)
+    check_methods(source, METHODS)
+    return source

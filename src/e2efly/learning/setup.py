@@ -1,0 +1,97 @@
+"""The objects that a configuration defines, before anything is compiled."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from e2efly.config import TrainConfig
+from e2efly.environment import Env
+from e2efly.learning.algorithm import Algorithm, make_algorithm
+from e2efly.learning.curriculum import Stage, stages
+from e2efly.learning.devices import share
+from e2efly.learning.networks import Actor
+from e2efly.learning.run_budget import check_run
+from e2efly.runs import presets
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The objects that a configuration defines, before anything is compiled."""
+
+    config: TrainConfig
+    stages: tuple[Stage, ...]
+    """Stages of the curriculum. The last stage is the task itself."""
+    algorithm: Algorithm
+    actor: Actor
+    updates: int
+    """Updates of the whole run."""
+    devices: int
+    """Devices that share the environments."""
+
+    @staticmethod
+    def of(config: TrainConfig) -> "Setup":
+        """Build and check everything that a configuration names.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        presets.check(config)
+        course = stages(config)
+        env = course[-1].env
+        actor = Actor.of(env.fields, env.cameras, config.network)
+        algorithm = make_algorithm(config.algo, actor)
+        per_update = config.algo.steps
+        chunks = -(-config.steps // (per_update * config.chunk))
+        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
+        config = dataclasses.replace(config, devices=devices)
+        setup = Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
+        setup.check()
+        return setup
+
+    def check(self, members: int = 1) -> None:
+        """Refuse a configuration if `members` such runs, trained together, exceed a limit (`e2efly.learning.run_budget`)."""
+        judged = self.episode_steps * len(self.judges)
+        check_run(self.config, self.env, self.actor, self.updates, judged, members)
+
+    @property
+    def vehicles(self) -> int:
+        """Number of vehicles that a device steps together."""
+        return self.config.algo.envs // self.devices
+
+    @property
+    def watched(self) -> int:
+        """Number of vehicles that a device flies together in an evaluation."""
+        return -(-self.config.eval_episodes // self.devices)
+
+    @property
+    def env(self) -> Env:
+        """The task's environment."""
+        return self.stages[-1].env
+
+    @property
+    def judges(self) -> dict[str, Env]:
+        """The environments of the evaluation, by the name of their criterion."""
+        return self.stages[-1].judges
+
+    @property
+    def nominal(self) -> dict[str, Env]:
+        """The same environments with the vehicle of the file in still air. Those that are already like this are left
+        out.
+        """
+        return {name: env.undisturbed() for name, env in self.judges.items() if env.is_disturbed}
+
+    @property
+    def steps_per_update(self) -> int:
+        """Environment steps per update."""
+        return self.config.algo.steps
+
+    @property
+    def episode_steps(self) -> int:
+        """Control steps of the longest episode in which the policy is judged."""
+        longest = max(float(task.episode_s) for task in self.config.task.criteria().values())
+        return math.ceil(longest / self.env.control_period - 1e-6)
+
+    @property
+    def settle(self) -> float:
+        """Time from which on the mean error counts, s."""
+        return float(getattr(self.config.task, "settle_s", 0.0))

@@ -1,0 +1,310 @@
+"""The contract of an exported policy: what it sees, what it commands, and what it was trained for.
+
+It is stored as JSON in the metadata of `policy.onnx` under the key `METADATA_KEY`. Imports no JAX and no simulator.
+"""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from e2efly.config.domain import Domain, Extent, outside
+from e2efly.config.storage import unique
+from e2efly.control import COMMAND_MODES
+from e2efly.control.modes import THRUST
+from e2efly.policy import contract_json as read
+from e2efly.policy.images import Image
+from e2efly.policy.observation import Field
+from e2efly.vehicles import Ranges, Vehicle
+from e2efly.vehicles.vehicle import GRAVITY
+
+CONTRACT_VERSION = 2
+"""Version of the meaning of these fields; a policy of another version is refused."""
+LARGEST = 1 << 20
+"""Largest length of the JSON. The longest of the zoo has 3050 characters."""
+METADATA_KEY = "contract"
+"""Key of the contract in the metadata of the ONNX file."""
+ACTION_SIZE = 4
+"""Number of entries of an action."""
+ACTION_LIMITS = (-1.0, 1.0)
+"""Smallest and largest entry of an action. Values outside are clipped before the mapping to a command."""
+ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
+"""Mapping from an action to a physical command, entry by entry."""
+RATES = (0.1, 10_000.0)
+"""Smallest and largest control rate, Hz."""
+FRAMES = ("world", "body", "world_body", "none")
+"""Frames of an observation field."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """What the policy commands."""
+
+    mode: str
+    """A command mode: a name of `COMMAND_MODES`."""
+    fields: tuple[str, ...]
+    """Names of the four commands."""
+    units: tuple[str, ...]
+    """Their units."""
+    low: tuple[float, ...]
+    """Command at action -1, in `units`. It is the smallest command that is ever sent."""
+    high: tuple[float, ...]
+    """Command at action +1, in `units`. It is the largest command that is ever sent."""
+    limits: tuple[float, ...] = ACTION_LIMITS
+    """Smallest and largest entry of an action."""
+    mapping: str = ACTION_MAPPING
+    """How an action becomes a command."""
+
+    @property
+    def command_range(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
+        """Smallest and largest command, in `units`."""
+        (a, b, c, d), (e, f, g, h) = self.low, self.high
+        return (a, b, c, d), (e, f, g, h)
+
+    def asking(self, command: np.ndarray) -> np.ndarray:
+        """The action that gives a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
+        low, high = np.array(self.low), np.array(self.high)
+        return np.clip(2 * (command - low) / (high - low) - 1, *ACTION_LIMITS).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Contract:
+    """Everything on which a policy and the program that flies it must agree."""
+
+    contract_version: int
+    """`CONTRACT_VERSION`."""
+    e2efly_version: str
+    """Version of the package that exported it. It is shown to people, but not compared."""
+    task: str
+    """Name of the task."""
+    vehicle: str
+    """Name of the vehicle, or of the family of vehicles."""
+    vehicle_hash: str | None
+    """Hash of the vehicle's parameters: 16 hex digits. None, and no JSON key, if there are ranges instead."""
+    control_rate_hz: float
+    """Rate at which the policy is called, Hz."""
+    latency_s: float
+    """Latency from observation to command for which the policy is made, s: the vehicle's. If training used other
+    latencies, their mean."""
+    latency_range_s: tuple[float, ...]
+    """Smallest and largest latency, s."""
+    observation_latency_range_s: tuple[float, ...]
+    """Smallest and largest age of the observed state in training, s."""
+    observation: tuple[Field, ...]
+    """The fields of the observation, in order."""
+    images: tuple[Image, ...]
+    """The images that the policy sees in addition, camera by camera."""
+    memory_size: int
+    """Number of values that it carries from one call to the next (the state of its GRU). 0: none."""
+    action: Action
+    """What it commands."""
+    hover_action: tuple[float, ...]
+    """The past actions that the policy is shown before its first action. They hover, if the command mode has a
+    hover."""
+    vehicle_ranges: Ranges | None = None
+    """Ranges of the vehicles that it flies, for a family. None, and no JSON key, for a single vehicle, identified by
+    the hash."""
+    courses: Domain | None = None
+    """Ranges of the courses and worlds that it was trained for. None, and no JSON key: not declared."""
+
+    def outside(self, courses: Domain) -> tuple[str, ...]:
+        """The quantities in which courses lie outside of what it was trained for, in words. Empty: in none, or its
+        training is not declared.
+        """
+        return outside(self.courses or (), courses)
+
+    def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """The reasons why the policy does not fly a (loaded) vehicle, in words. Empty: it flies it.
+
+        It flies the vehicle that it was trained on, or all vehicles within its ranges, with the delays of its training.
+        """
+        if self.vehicle_ranges is not None:
+            late = self.latency_range_s
+            return dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
+        if vehicle.hash == self.vehicle_hash:
+            return ()
+        return (
+            f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
+            f"{self.vehicle!r} as the policy was trained on it: load that one, or train the policy again",
+        )
+
+    def latency_of(self, vehicle: Vehicle) -> float:
+        """Latency from observation to command with which a vehicle flies, s. A vehicle of a family has its own."""
+        return self.latency_s if self.vehicle_ranges is None else float(vehicle.latency)
+
+    @cached_property
+    def observation_size(self) -> int:
+        """Number of entries of the observation."""
+        return sum(field.size for field in self.observation)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """The position of each field in the observation, by name, in order."""
+        ends = list(accumulate(field.size for field in self.observation))
+        return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
+
+    @cached_property
+    def attitude(self) -> str:
+        """Name of the field that holds the attitude."""
+        return next(field.name for field in self.observation if field.frame == "world_body")
+
+    def to_json(self) -> str:
+        """The contract as JSON.
+
+        Raises:
+            ValueError: for a contract that `from_json` would refuse.
+        """
+        left_out = {"vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"}
+        left_out |= {"courses"} if self.courses is None else set()
+        content = {key: value for key, value in dataclasses.asdict(self).items() if key not in left_out}
+        text = json.dumps(content, indent=2)
+        Contract.from_json(text)
+        return text
+
+    @staticmethod
+    def from_json(text: str) -> "Contract":
+        """Read a contract, checking every value.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        if len(text) > LARGEST:
+            raise ValueError(f"contract: has {len(text)} characters; accepted: at most {LARGEST}")
+        try:
+            content = json.loads(text, object_pairs_hook=unique)
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"contract: not JSON: {error}") from None
+        if isinstance(content, dict) and "contract_version" in content:  # first: other versions have other keys
+            version = content["contract_version"]
+            if type(version) is not int or version != CONTRACT_VERSION:
+                raise read.refusal("contract_version", version, f"{CONTRACT_VERSION}; export it again with this e2efly")
+        if isinstance(content, dict):
+            absent = "vehicle_hash" if "vehicle_ranges" in content else "vehicle_ranges"
+            if absent in content:
+                raise read.refusal(absent, content[absent], "one of vehicle_hash and vehicle_ranges, not both")
+            content = {"courses": None} | content | {absent: None}
+        return _contract(read.table(content, "", Contract))
+
+
+def _contract(x: dict[str, Any]) -> Contract:
+    latency = read.seconds_range(x["latency_range_s"], "latency_range_s")
+    latency_s = read.number(x["latency_s"], "latency_s")
+    if not latency[0] <= latency_s <= latency[1]:
+        raise read.refusal("latency_s", latency_s, f"a number of seconds within latency_range_s, {list(latency)}")
+    rate = read.number(x["control_rate_hz"], "control_rate_hz")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise read.refusal("control_rate_hz", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    vehicle_hash = None if x["vehicle_ranges"] is not None else read.text(x["vehicle_hash"], "vehicle_hash")
+    if vehicle_hash is not None and (len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef")):
+        raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
+    hover = read.numbers(x["hover_action"], "hover_action", ACTION_SIZE)
+    if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
+        raise read.refusal("hover_action", list(hover), "four numbers in [-1, 1]")
+    return Contract(
+        contract_version=x["contract_version"],
+        e2efly_version=read.text(x["e2efly_version"], "e2efly_version"),
+        task=read.text(x["task"], "task"),
+        vehicle=read.text(x["vehicle"], "vehicle"),
+        vehicle_hash=vehicle_hash,
+        control_rate_hz=rate,
+        latency_s=latency_s,
+        latency_range_s=latency,
+        observation_latency_range_s=read.seconds_range(x["observation_latency_range_s"], "observation_latency_range_s"),
+        observation=_observation(x["observation"]),
+        images=_images(x["images"], rate),
+        memory_size=read.whole(x["memory_size"], "memory_size", 0),
+        action=_action(x["action"]),
+        hover_action=hover,
+        vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
+        courses=None if x["courses"] is None else _courses(x["courses"]),
+    )
+
+
+def _courses(value: Any) -> Domain:
+    if not isinstance(value, list):
+        raise read.refusal("courses", value, "a list of ranges, empty for a goal that is one place")
+    found = []
+    for i, entry in enumerate(value):
+        where = f"courses[{i}]"
+        x = read.table(entry, where, Extent)
+        name, unit = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit"))
+        low, high = (read.number(x[key], f"{where}.{key}") for key in ("low", "high"))
+        if not (name.isascii() and name.isidentifier()) or name in (part.name for part in found):
+            raise read.refusal(f"{where}.name", name, "a word of letters, digits and _, each once")
+        if low > high:
+            raise read.refusal(f"{where}.low", low, f"at most {where}.high, {high:g}")
+        found.append(Extent(name, unit, low, high))
+    return tuple(found)
+
+
+def _ranges(value: Any) -> Ranges:
+    x = read.table(value, "vehicle_ranges", Ranges)
+    bounds = {name: read.numbers(pair, f"vehicle_ranges.{name}", 2) for name, pair in x.items()}
+    ranges = Ranges(**{name: (pair[0], pair[1]) for name, pair in bounds.items()})
+    ranges.check("contract: vehicle_ranges")
+    return ranges
+
+
+def _observation(value: Any) -> tuple[Field, ...]:
+    entries = read.entries(value, "observation", None)
+    fields = tuple(_field(entry, f"observation[{i}]") for i, entry in enumerate(entries))
+    names = [field.name for field in fields]
+    if len(set(names)) != len(names):
+        raise read.refusal("observation", names, "fields of different names")
+    if sum(field.frame == "world_body" for field in fields) != 1:
+        raise read.refusal("observation", names, "fields with exactly one attitude (frame 'world_body')")
+    return fields
+
+
+def _field(value: Any, where: str) -> Field:
+    x = read.table(value, where, Field)
+    size, frame = read.whole(x["size"], f"{where}.size", 1), read.text(x["frame"], f"{where}.frame")
+    if frame not in FRAMES:
+        raise read.refusal(f"{where}.frame", frame, " or ".join(map(repr, FRAMES)))
+    if (frame == "world" and size % 3) or (frame == "world_body" and size != 4):
+        needed = "a multiple of 3, as its frame is 'world'" if frame == "world" else "4, as its frame is 'world_body'"
+        raise read.refusal(f"{where}.size", size, needed)
+    scale = read.number(x["scale"], f"{where}.scale")
+    if scale <= 0:
+        raise read.refusal(f"{where}.scale", scale, "a positive number")
+    name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
+    return Field(name, size, frame, unit, scale, text)
+
+
+def _images(value: Any, rate: float) -> tuple[Image, ...]:
+    if not isinstance(value, list):
+        raise read.refusal("images", value, "a list of images, empty for a policy that sees none")
+    images = tuple(Image.of_json(entry, f"images[{i}]") for i, entry in enumerate(value))
+    names = [image.name for image in images]
+    if len(set(names)) != len(names):
+        raise read.refusal("images", names, "images of different names")
+    for i, image in enumerate(images):
+        if image.rate_hz > rate * (1 + 1e-6):
+            raise read.refusal(f"images[{i}].rate_hz", image.rate_hz, f"at most control_rate_hz, {rate:g}")
+    return images
+
+
+def _action(value: Any) -> Action:
+    x = read.table(value, "action", Action)
+    mode = read.text(x["mode"], "action.mode")
+    if mode not in COMMAND_MODES:
+        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMAND_MODES)))
+    fields, units = COMMAND_MODES[mode].fields, COMMAND_MODES[mode].units
+    for key, accepted in (("fields", fields), ("units", units)):
+        if x[key] != list(accepted):
+            raise read.refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
+    if read.numbers(x["limits"], "action.limits", 2) != ACTION_LIMITS:
+        raise read.refusal("action.limits", x["limits"], f"{list(ACTION_LIMITS)}")
+    if x["mapping"] != ACTION_MAPPING:
+        raise read.refusal("action.mapping", x["mapping"], repr(ACTION_MAPPING))
+    low, high = (read.numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise read.refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
+    if fields[0] == THRUST and not 0 <= low[0] < GRAVITY < high[0]:
+        accepted = f"from 0 or more, below {GRAVITY} m/s^2, to more than it, which hovers"
+        raise read.refusal("action.low[0] to action.high[0], the collective thrust,", [low[0], high[0]], accepted)
+    return Action(mode, fields, units, low, high)

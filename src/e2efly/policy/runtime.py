@@ -1,0 +1,418 @@
+"""A policy in flight: what it sees, when it is called, what it commands. Pure, except for timing the network.
+
+`begin` hands the vehicle over to the policy. `act` calls the policy once per period; it takes and returns the state.
+"""
+
+import dataclasses
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from e2efly.control import COMMAND_MODES
+from e2efly.policy.contract import ACTION_SIZE, Contract
+from e2efly.policy.goal import Course, Outcome
+from e2efly.policy.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, PAST_ACTIONS, VELOCITY, Field
+from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
+from e2efly.vehicles import Vehicle
+
+MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
+"""Command modes that are converted to collective thrust and body rates. A flight controller accepts no rotor
+thrusts."""
+_STATE_FIELDS = (ATTITUDE, VELOCITY, BODY_RATE, GYROSCOPE, ACCELEROMETER)
+_IMU_FIELDS = (GYROSCOPE.name, ACCELEROMETER.name)
+_ROUNDING = 1e-6
+"""Rounding tolerance of the clock, in periods."""
+
+
+@dataclass(frozen=True)
+class Imu:
+    """A measurement of the inertial sensors."""
+
+    gyroscope: np.ndarray
+    """(3,) angular velocity about body x, y, z, rad/s."""
+    accelerometer: np.ndarray
+    """(3,) specific force along body x, y, z, m/s^2; level at rest: 0, 0, 9.81."""
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The states of the vehicle in which a policy may take over. Training rarely had states beyond these limits."""
+
+    speed: float = 5.0
+    """Largest speed, m/s."""
+    tilt: float = 0.7853981633974483
+    """Largest tilt, rad."""
+    distance: float | None = None
+    """Largest distance to the goal, m. If omitted, the distance at which an episode of the training ends. For a place
+    that another program commands, at any time: 3 m."""
+    start: float = 1.5
+    """Largest distance to the start of a course that has its own heading, m."""
+    heading: float = 0.35
+    """Largest angle between the heading of the vehicle and the start heading of such a course, rad."""
+
+
+class Acting(Protocol):
+    """What flies by observations and actions: a policy (`e2efly.policy.loader.Policy`), or an object that acts
+    as one.
+    """
+
+    @property
+    def contract(self) -> Contract:
+        """What it sees and commands."""
+        ...
+
+    def act(
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: Any = None
+    ) -> tuple[np.ndarray, Any]:
+        """The action for an observation, (4,) in [-1, 1], and the memory for the next call. Memory None: there was
+        none.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """A policy, and where it has to fly. Create it with `Runtime.of`."""
+
+    policy: Acting
+    course: Course
+    envelope: Envelope
+    period: float
+    """Time between two calls of the policy, s."""
+    low: np.ndarray
+    """(4,) command at action -1."""
+    span: np.ndarray
+    """(4,) difference between the commands at action +1 and -1."""
+
+    @staticmethod
+    def of(
+        policy: Acting,
+        course: Course,
+        vehicle: Vehicle,
+        control_rate: float | None = None,
+        *,
+        envelope: Envelope | None = None,
+        imu: bool = False,
+        images: bool = False,
+    ) -> "Runtime":
+        """Check that the parts fit together.
+
+        Args:
+            policy: the loaded policy, or an object that acts as one.
+            course: the course, from `e2efly.tasks.route.course_for`.
+            vehicle: the vehicle that flies.
+            control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
+            envelope: the states in which the policy may take over.
+            imu: whether `act` will be given IMU measurements.
+            images: whether `act` will be given the images that the contract asks for.
+
+        Raises:
+            ValueError: naming everything that does not fit, one item per line.
+        """
+        contract, envelope = policy.contract, envelope or Envelope()
+        reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images)
+        for name, value in dataclasses.asdict(envelope).items():
+            if value is not None and not value > 0:
+                reasons += (f"envelope.{name} is {value}; accepted: more than 0",)
+        if reasons:
+            raise ValueError("\n".join(reasons))
+        low, high = np.array(contract.action.low), np.array(contract.action.high)
+        return Runtime(policy, course, envelope, 1 / contract.control_rate_hz, low, high - low)
+
+
+@dataclass(frozen=True)
+class RuntimeState:
+    """The state that one call of the policy passes to the next."""
+
+    task: Any
+    """State of the task."""
+    outcome: Outcome | None
+    """Outcome of the last step. None: there was no step."""
+    failure: str
+    """The reason why the task can no longer be completed. Empty while it can."""
+    odometry: Odometry
+    """The motion that was last judged, in the task's world."""
+    past_actions: np.ndarray
+    """(k, 4) float32, the policy's last actions, newest first, where k is the number that it sees."""
+    recurrent: Any
+    """For a policy, (m,) float32: its recurrent state. For another object that acts, its memory. None: not yet
+    called."""
+    began: float
+    """When the policy took over, s on the monotonic clock."""
+    slots: int
+    """Number of periods that are over since then: acted or missed."""
+    steps: int
+    """Number of times that the policy has acted."""
+
+    judged: float = 0.0
+    """When the outcome was judged, s since the policy took over."""
+    done: bool = False
+    """Whether the task is over, but not because of a failure in flight."""
+
+    @property
+    def missed(self) -> int:
+        """Number of periods in which the policy was not called."""
+        return self.slots - self.steps
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the policy saw and what it commands."""
+
+    observation: np.ndarray
+    """(o,) float32, as `contract.observation` says."""
+    action: np.ndarray
+    """(4,) float32 in [-1, 1]."""
+    command: np.ndarray
+    """(4,) in `contract.action.units`."""
+    mode: str
+    """The command mode."""
+    position: np.ndarray | None
+    """(3,) position of the goal, world, m. None: there is no such place."""
+    late_s: float
+    """Delay of the call after it was due, s."""
+    inference_s: float
+    """Duration of the network and its checks, s."""
+
+
+def check(
+    contract: Contract,
+    vehicle: Vehicle,
+    shown: Sequence[Field],
+    control_rate: float | None = None,
+    *,
+    imu: bool = False,
+    images: bool = False,
+) -> tuple[str, ...]:
+    """The reasons why a policy cannot fly here. Empty: it can.
+
+    Args:
+        contract: the contract of the policy.
+        vehicle: the vehicle that flies.
+        shown: the task's own fields of the observation.
+        control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
+        imu: whether IMU measurements are available.
+        images: whether the images that the contract asks for are available.
+    """
+    reasons = list(contract.refusals(vehicle))
+    rate = contract.control_rate_hz
+    if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:
+        reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")
+    if contract.action.mode not in MODES:
+        reasons.append(
+            f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
+            "which become collective thrust and body rates"
+        )
+    for image in contract.images if not images else ():
+        reasons.append(
+            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
+            "accepted: a policy without images (from Python, `Policy.act` takes them)"
+        )
+    known = {field.name: field for field in (*shown, *_STATE_FIELDS)}
+    for field in contract.observation:
+        same = known.get(field.name)
+        if field.name == PAST_ACTIONS:
+            if field.size % ACTION_SIZE:
+                reasons.append(f"observation field {field.name!r} has size {field.size}; accepted: a multiple of 4")
+        elif same is None:
+            accepted = ", ".join(sorted((*known, PAST_ACTIONS)))
+            reasons.append(f"observation field {field.name!r}: nothing on board says it; accepted: {accepted}")
+        elif (field.size, field.frame, field.unit) != (same.size, same.frame, same.unit):
+            reasons.append(
+                f"observation field {field.name!r} has size {field.size}, frame {field.frame!r} and unit "
+                f"{field.unit!r}; accepted: {same.size}, {same.frame!r} and {same.unit!r}"
+            )
+        elif field.name in _IMU_FIELDS and not imu:
+            reasons.append(f"observation field {field.name!r}: there is no IMU; accepted: a policy without, or an IMU")
+    seen = {field.name for field in contract.observation}
+    if lacking := [field.name for field in shown if field.name not in seen]:
+        reasons.append(
+            f"observation shows {', '.join(sorted(seen))}; accepted: with {', '.join(lacking)}, as its task is "
+            f"{contract.task!r}"
+        )
+    return tuple(reasons)
+
+
+def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
+    """Hand over to the policy. The task starts. The policy is shown hover actions as its past actions, as in training.
+
+    Args:
+        runtime: the policy and its course.
+        odometry: the newest motion.
+        now: the time on the monotonic clock, s. The first action is due at once.
+    """
+    contract = runtime.policy.contract
+    past = contract.slices.get(PAST_ACTIONS, slice(0, 0))
+    count = (past.stop - past.start) // ACTION_SIZE
+    actions = np.tile(np.asarray(contract.hover_action, np.float32), (count, 1))
+    start, local = runtime.course.memory, odometry.seen_from(runtime.course.origin)
+    return RuntimeState(start, None, "", local, actions, None, began=now, slots=0, steps=0)
+
+
+def due(runtime: Runtime, state: RuntimeState) -> float:
+    """When the policy must be called next, s on the monotonic clock. The times lie on a grid from `begin`, without
+    drift.
+    """
+    return state.began + state.slots * runtime.period
+
+
+def act(
+    runtime: Runtime,
+    state: RuntimeState,
+    odometry: Odometry,
+    now: float,
+    imu: Imu | None = None,
+    *,
+    seen: Odometry | None = None,
+    images: Sequence[np.ndarray] = (),
+) -> tuple[RuntimeState, Decision]:
+    """Call the policy once.
+
+    Args:
+        runtime: the policy and its course.
+        state: from `begin` or the last `act`.
+        odometry: the newest motion.
+        now: the time on the monotonic clock, s, at or after `due`. Whole periods since `due` count as missed.
+        imu: the newest measurement, for a policy that sees an IMU.
+        seen: the motion that the policy sees, for a simulation that judges by the true motion but shows it with an
+            error. None: `odometry`.
+        images: the newest image of each camera, in the contract's order.
+
+    Raises:
+        ValueError: for every problem, naming the field if there is one: a non-finite observation or action, an
+            attitude that is not a unit quaternion, a missing IMU, or an error of the network. The caller must then
+            command nothing.
+    """
+    course, local = runtime.course, odometry.seen_from(runtime.course.origin)
+    state = judged(runtime, state, local, now)
+    local = local if seen is None else seen.seen_from(course.origin)
+    elapsed, body = np.array([now - state.began]), local.batch
+    shown = np.asarray(course.goal.observe(state.task, elapsed, body))[0]
+    observation = observe(runtime, shown, state.past_actions, local, imu)
+    started = time.perf_counter()
+    try:
+        action, recurrent = runtime.policy.act(observation, images, memory=state.recurrent)
+    except ValueError:
+        raise
+    except Exception as error:  # ONNX Runtime's errors share no other base
+        raise ValueError(f"the policy failed: {error}") from error
+    spent = time.perf_counter() - started
+    past = state.past_actions
+    if len(past):
+        past = np.concatenate([action[None], past[:-1]])
+    late = now - due(runtime, state)
+    over = max(math.floor(late / runtime.period + _ROUNDING), 0)
+    decision = Decision(
+        observation=observation,
+        action=action,
+        command=runtime.low + (action.astype(np.float64) + 1) / 2 * runtime.span,  # `contract.action.mapping`
+        mode=runtime.policy.contract.action.mode,
+        position=course.origin.points(np.asarray(course.goal.goal(state.task, elapsed))[0]),
+        late_s=late,
+        inference_s=spent,
+    )
+    slots, steps = state.slots + over + 1, state.steps + 1
+    return dataclasses.replace(state, past_actions=past, recurrent=recurrent, slots=slots, steps=steps), decision
+
+
+def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float) -> RuntimeState:
+    """Let the task judge what the vehicle has done since the last call of the policy.
+
+    Args:
+        runtime: the policy and its course.
+        state: from `begin` or the last `act`.
+        odometry: the newest motion, in the task's world.
+        now: s on the monotonic clock.
+    """
+    if state.steps == 0:
+        return dataclasses.replace(state, odometry=odometry)
+    course, elapsed = runtime.course, now - state.began
+    timed_out = elapsed >= course.duration - 1e-3 * runtime.period
+    task, outcome = course.goal.advance(
+        state.task, state.odometry.batch, odometry.batch, np.array([elapsed]), np.array([timed_out])
+    )
+    done = course.goal.done(outcome) or timed_out
+    failed = bool(outcome.terminated[0]) and not done
+    failure = state.failure or (course.goal.failure(state.task, outcome) if failed else "")
+    return dataclasses.replace(
+        state, task=task, outcome=outcome, failure=failure, odometry=odometry, judged=elapsed, done=done and not failure
+    )
+
+
+def observe(
+    runtime: Runtime, shown: np.ndarray, past_actions: np.ndarray, odometry: Odometry, imu: Imu | None = None
+) -> np.ndarray:
+    """The observation, float32 (o,), as the training environment makes it.
+
+    Args:
+        runtime: the policy and its course.
+        shown: (k,) the task's own fields, in their order.
+        past_actions: (a, 4) newest first.
+        odometry: the motion, in the task's world.
+        imu: the measurement, for a policy that sees an IMU.
+
+    Raises:
+        ValueError: when the policy sees an IMU and there is none.
+    """
+    contract = runtime.policy.contract
+    slices, row = contract.slices, np.empty(contract.observation_size, np.float32)
+    at = 0
+    for field in runtime.course.goal.fields:
+        row[slices[field.name]] = shown[at : at + field.size]
+        at += field.size
+    for name, part in slices.items():
+        if name == ATTITUDE.name:
+            row[part] = odometry.quaternion
+        elif name == VELOCITY.name:
+            row[part] = odometry.velocity
+        elif name == BODY_RATE.name:
+            row[part] = odometry.body_rate
+        elif name == PAST_ACTIONS:
+            row[part] = past_actions.ravel()
+        elif name in _IMU_FIELDS:
+            if imu is None:
+                raise ValueError(f"observation field {name!r}: there is no measurement of an IMU; accepted: an `Imu`")
+            row[part] = imu.gyroscope if name == GYROSCOPE.name else imu.accelerometer
+    return row
+
+
+def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeState | None = None) -> tuple[str, ...]:
+    """The reasons why the policy should not fly from this state of the vehicle. Empty: it may.
+
+    Args:
+        runtime: the policy, its goal and its envelope.
+        odometry: the newest motion.
+        now: s on the monotonic clock.
+        state: the state of a flight that has begun. None: as if the policy took over now.
+    """
+    envelope, course = runtime.envelope, runtime.course
+    local = odometry.seen_from(course.origin)
+    task, elapsed = (course.memory, 0.0) if state is None else (state.task, now - state.began)
+    where = np.asarray(course.goal.goal(task, np.array([elapsed])))[0]
+    fence = getattr(course.goal.config, "fence", math.inf) if envelope.distance is None else envelope.distance
+    limits = (
+        ("speed", float(np.linalg.norm(local.velocity)), envelope.speed, "m/s"),
+        ("tilt", tilt_of(local.quaternion), envelope.tilt, "rad"),
+        ("distance", float(np.linalg.norm(local.position - where)), fence, "m from the goal"),
+    )
+    if course.heading is not None and state is None:
+        off = math.remainder(yaw_of(local.quaternion) - course.heading, math.tau)
+        told = math.degrees(course.heading + course.origin.yaw)
+        limits += (
+            ("distance", float(np.linalg.norm(local.position - course.start)), envelope.start, "m from the start"),
+            ("heading", abs(off), envelope.heading, f"rad from the start's, {told:.0f} deg"),
+        )
+    return beyond(limits)
+
+
+def beyond(limits: Sequence[tuple[str, float, float, str]]) -> tuple[str, ...]:
+    """The values beyond their limits, in words. Each is given as (name, value, limit, unit)."""
+    return tuple(
+        f"{name} is {value:.3g} {unit}; accepted: at most {limit:.3g}"
+        for name, value, limit, unit in limits
+        if not value <= limit  # true for NaN
+    )

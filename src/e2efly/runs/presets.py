@@ -1,0 +1,282 @@
+"""The configurations with which a task is learned: robust, nominal, the paper's, and variants. Imports no JAX.
+
+A preset is a `TrainConfig`. A variant of one is made by `dataclasses.replace`.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from e2efly.config import (
+    ALGORITHMS,
+    ABPTConfig,
+    AlgorithmConfig,
+    BPTTConfig,
+    DisturbanceConfig,
+    EnvConfig,
+    PPOConfig,
+    RewardConfig,
+    TaskConfig,
+    TrainConfig,
+)
+from e2efly.config.names import unknown
+from e2efly.config.numbers import check_fields
+from e2efly.config.registry import is_shipped
+from e2efly.config.tables import LARGEST
+from e2efly.policy import zoo
+from e2efly.policy.loader import load_policy
+from e2efly.policy.observation import PAST_ACTIONS
+from e2efly.policy.zoo import policy_file
+from e2efly.tasks import TASKS
+from e2efly.vehicles import load_family, load_vehicle, posterior
+
+ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
+FAMILY = "any"
+"""The family whose policies of the zoo are the starting points of the preset `identified`."""
+OTHERS = EnvConfig(
+    latency_spread=(0.04, 0.05),
+    randomize={
+        "mass": 0.25, "inertia": 0.5, "motor_time_constant": 0.8, "drag_linear": 0.9, "drag_quadratic": 0.9,
+        "torque_ratio": 0.3, "rate_gain": 0.5,
+    },
+    wind=3.0,
+    disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
+)  # fmt: skip
+"""The vehicles of the preset `robust`."""
+AROUND = EnvConfig(
+    randomize={posterior.IDENTIFIED: 1.0},
+    wind=2.0,
+    disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
+)
+"""The vehicles of the preset `identified`: the uncertainty that the file's standard deviations give, and effects that
+no file gives."""
+ONE_OF_A_FAMILY = 5
+"""Factor by which the preset `identified` has fewer steps than the recipe for a family. It begins with a policy of that
+family."""
+BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
+"""Variations of cameras that the preset `robust` draws in addition to those of the task."""
+OLDER = 0.05
+"""Largest additional age of images in the preset `robust`, s."""
+BESIDE_FAMILY = EnvConfig(
+    latency_spread=(0.0, 0.012),
+    randomize={"inertia": 0.2, "motor_time_constant": 0.2, "rate_gain": 0.2},
+    wind=2.0,
+    disturbance=DisturbanceConfig(gust=0.3, thrust=0.1, rotor=0.03, sag=0.1),
+)
+"""Effects that the preset `robust` draws for a family in addition to its vehicles, because their files do not give
+them."""
+
+
+def names() -> tuple[str, ...]:
+    """The names of all presets. Not every task has each."""
+    return ROBUST, IDENTIFIED, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
+
+
+def default(
+    task: type[TaskConfig], learner: type[AlgorithmConfig], given: Callable[[str], Any] = lambda name: None
+) -> str:
+    """The preset of a task if none is named: robust, if the algorithm has a recipe for it.
+
+    Args:
+        task: the class of the task's options.
+        learner: the class of the algorithm's options.
+        given: function from the name of a task option to its value. Some values require presets of their own.
+    """
+    for (name, value), asked in task.asked.items():
+        if given(name) == value:
+            return asked
+    return ROBUST if learner.name in task.robust else NOMINAL
+
+
+def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
+    """The configuration of a task and an algorithm.
+
+    Args:
+        task: name of the task, or a reference to the user's own: `path/to/file.py:Name`, `package.module:Name`.
+        algo: name of the algorithm, or a reference to the user's own.
+        name: one of `names()`.
+
+    Raises:
+        ValueError: for an unknown name, with the nearest one and all names; or for a preset that the task does not
+            have.
+    """
+    options = TASKS.find(task)
+    learner = ALGORITHMS.find(algo)
+    if name not in names():
+        raise ValueError(unknown("preset", name, names()))
+    if name == PAPER:
+        return _paper(options, learner.name)
+    config = _nominal(options, learner)
+    if name == NOMINAL:
+        return config
+    if name in (ROBUST, IDENTIFIED):
+        return _adaptive(options, config, name)
+    if name not in options.variants:
+        having = ", ".join(other for other, known in TASKS.items() if name in known.variants)
+        raise ValueError(f"preset {name!r}: accepted for task {having}, not {options.name!r}")
+    return options.variant(name, config)
+
+
+def _nominal(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> TrainConfig:
+    """The task's recipe.
+
+    For a user's own algorithm: its defaults, with the recipe of the algorithm that it resembles.
+    """
+    if not is_shipped(learner):
+        return dataclasses.replace(task.recipe(learner.like), algo=learner())
+    return task.recipe(learner.name) if learner.name in ("ppo", "bptt") else _with_critic(task, learner.name)
+
+
+def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
+    """BPTT's preset with critics, and with rewards that suit them."""
+    config = task.recipe("bptt")
+    shared = ("max_grad_norm", "gradient_decay") if algo == "foppo" else (
+        "max_grad_norm", "gradient_decay", "learning_rate", "learning_rate_end", "envs"
+    )  # fmt: skip
+    taken: dict[str, Any] = {name: getattr(config.algo, name) for name in shared} | task.with_critic(algo)
+    smooth = task.smooth
+    reward = task.recipe("ppo").reward if smooth is None else RewardConfig(dict(smooth), config.reward.parameters)
+    return dataclasses.replace(config, algo=ALGORITHMS[algo](**taken), reward=reward)
+
+
+def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
+    """A different vehicle in every episode, and a policy with a memory that senses it."""
+    algo = config.algo.name
+    given = task.robust.get(algo)
+    if name == IDENTIFIED and (other := task.family.get(algo)):
+        # the zoo's policy for any quadrotor also flies this vehicle, and adapts to it in a few steps
+        given = dataclasses.replace(other, steps=other.steps // ONE_OF_A_FAMILY)
+        if task.name in zoo.contents().get(FAMILY, {}):
+            config = dataclasses.replace(config, start_from=f"{FAMILY}/{task.name}")
+    if given is None:
+        raise ValueError(
+            f"preset {name!r}: accepted for {_having('robust')}; not for {task.name} by {config.algo.name}"
+        )
+    cameras = tuple(
+        dataclasses.replace(c, latency=(c.latency[0], c.latency[1] + OLDER), **BESIDE_CAMERA)
+        for c in config.env.cameras
+    )
+    env = OTHERS if name == ROBUST else AROUND
+    return given.into(dataclasses.replace(config, env=dataclasses.replace(env, cameras=cameras)))
+
+
+def _having(recipes: str) -> str:
+    """The tasks that have a recipe, with the algorithms of each recipe."""
+    found = {name: getattr(known, recipes) for name, known in TASKS.items()}
+    return ", ".join(f"{name} by {' or '.join(by)}" for name, by in found.items() if by)
+
+
+def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
+    """The paper's rewards, sizes and learning rates (its tables; docs/rewards.md lists what it does not give)."""
+    if algo not in ("ppo", "bptt", "abpt"):
+        raise ValueError(f"preset 'paper': the paper does not train by {algo!r}; accepted: ppo, bptt, abpt")
+    given = task.paper
+    if given is None:
+        having = ", ".join(name for name, known in TASKS.items() if known.paper is not None)
+        raise ValueError(f"preset 'paper': the paper has no reward for task {task.name!r}; accepted: {having}")
+    weights = dict(given.weights)
+    if algo == "ppo":
+        weights |= given.ppo
+        settings: AlgorithmConfig = PPOConfig(
+            envs=100, horizon=256, minibatch=25_600, epochs=10, learning_rate=1e-4, learning_rate_end=1e-5,
+            gamma=0.99,
+        )  # fmt: skip
+    elif algo == "abpt":
+        settings = ABPTConfig(
+            envs=100, horizon=96, collect=10, buffer=100_000, places=1000, minibatch=25_600, learning_rate=1e-3,
+            learning_rate_end=1e-5, critic_rate=1.0, gamma=0.99, target_share=0.005,
+        )  # fmt: skip
+    else:
+        settings = BPTTConfig(envs=100, horizon=96, learning_rate=1e-3, learning_rate_end=1e-5)
+    steps = given.millions[algo != "ppo"] * 1_000_000
+    seen = tuple(dataclasses.replace(camera, width=64, height=64) for camera in task.cameras)
+    return TrainConfig(
+        task.training(), settings, RewardConfig(weights), EnvConfig(cameras=seen), steps=steps, chunk=10,
+        curriculum=task.curriculum,
+    )  # fmt: skip
+
+
+def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
+    """A configuration for another vehicle or a family, given by name or .toml file.
+
+    If the weakest vehicle of the preset `robust` could not hover, the ranges of mass and thrust are all reduced by the
+    same factor. For a family the preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
+
+    Raises:
+        ValueError: for a vehicle that does not exist.
+    """
+    env = dataclasses.replace(config.env, vehicle=vehicle)
+    robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
+    if robust and load_family(vehicle) is not None:
+        given = config.task.family.get(config.algo.name)
+        if given is None:
+            raise ValueError(
+                f"--vehicle is {vehicle}, a family; accepted by preset 'robust' for {_having('family')}; not for "
+                f"{config.task.name} by {config.algo.name}"
+            )
+        return given.into(dataclasses.replace(config, env=dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle)))
+    if robust:
+        margin = load_vehicle(vehicle).thrust_to_weight
+        shares = (_narrower(percent / 100) for percent in range(100, -1, -1))
+        drawn = next(drawn for drawn in shares if margin * drawn.weakest >= 1)
+        env = dataclasses.replace(env, randomize=drawn.randomize, disturbance=drawn.disturbance)
+    return dataclasses.replace(config, env=env)
+
+
+def _narrower(share: float) -> EnvConfig:
+    d = OTHERS.disturbance
+    return dataclasses.replace(
+        OTHERS,
+        randomize={**OTHERS.randomize, "mass": share * OTHERS.randomize["mass"]},
+        disturbance=dataclasses.replace(d, thrust=share * d.thrust, rotor=share * d.rotor, sag=share * d.sag),
+    )
+
+
+def begun(config: TrainConfig) -> TrainConfig:
+    """A configuration with the file of its initial policy, and with the observations and commands of that policy.
+
+    It has the same number of past actions as that policy, unless the configuration gives another number. The actions of
+    a policy of many vehicles keep their meaning as commands. Those of another policy are shares of the vehicle's own
+    command range.
+
+    Raises:
+        ValueError: for a policy that does not exist, or cannot be read.
+    """
+    if config.start_from is None:
+        return config
+    file = policy_file(config.start_from, config.env.vehicle)
+    contract, env = load_policy(file).contract, config.env
+    if env.past_actions is None:
+        seen = sum(field.size for field in contract.observation if field.name == PAST_ACTIONS)
+        env = dataclasses.replace(env, past_actions=seen // len(contract.action.low))
+    if contract.vehicle_ranges is not None and env.command_range is None and contract.action.mode == env.command_mode:
+        env = dataclasses.replace(env, command_range=contract.action.command_range)
+    return dataclasses.replace(config, env=env, start_from=str(file.absolute()))
+
+
+def gentle(config: TrainConfig) -> TrainConfig:
+    """A configuration for a run that starts from a policy's weights.
+
+    Its learning rate is that with which other runs end.
+    """
+    if not hasattr(config.algo, "learning_rate_end"):
+        return config
+    rate: Any = config.algo.learning_rate_end  # type: ignore[attr-defined]
+    return dataclasses.replace(config, algo=dataclasses.replace(config.algo, **{"learning_rate": rate}))
+
+
+def check(config: TrainConfig) -> None:
+    """Check the numbers of a run.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted.
+    """
+    check_fields("", config)
+    config.algo.check()
+    if not config.network.hidden:
+        raise ValueError("network.hidden is (); accepted: one or more sizes")
+    for name, value in (*config.reward.weights.items(), *config.reward.parameters.items()):
+        if not abs(value) <= LARGEST:  # true for NaN
+            raise ValueError(f"reward {name} is {value}; accepted: a number, -{LARGEST:g} to {LARGEST:g}")
+    if not config.reward.weights:
+        raise ValueError("reward.weights is empty; accepted: at least one term (see `e2efly list rewards`)")

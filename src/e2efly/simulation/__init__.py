@@ -1,0 +1,1 @@
+"""What is simulated: the physics, the sensors, the worlds and the reward."""

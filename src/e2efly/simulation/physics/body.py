@@ -1,0 +1,164 @@
+"""The rigid body: its forces and torques, and the resulting accelerations (paper, Quadrotor Dynamics)."""
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.simulation.physics.airframe import Plant, Rotors
+from e2efly.simulation.physics.state import Parts
+from e2efly.vehicles.terms import LEAST_VOLTAGE
+from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities, terms
+
+jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
+
+
+def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
+    """Thrust of each rotor, N: the quadratic thrust map, never negative, times the rotor's share."""
+    k2, k1, k0 = plant.thrust_map
+    a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
+    if plant.rotor_share is None:
+        return a, b, c, d
+    s = plant.rotor_share
+    return a * s[0], b * s[1], c * s[2], d * s[3]
+
+
+def powered(plant: Plant, rotor_speed: Rotors, command: Rotors) -> Rotors:
+    """Speeds, rad/s, that rotors approach under speed commands, at the battery voltage under their present thrust."""
+    battery = plant.battery
+    if battery is None:
+        return command
+    voltage = battery.voltage
+    if battery.sag is not None:
+        a, b, c, d = rotor_thrust(plant, rotor_speed)
+        voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
+    share = voltage if battery.exponent is None else voltage**battery.exponent
+    a, b, c, d = (share * speed for speed in command)
+    return a, b, c, d
+
+
+def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
+    """The rotor speed, rad/s, that gives each thrust, N (at or above the idle thrust)."""
+    k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+    half, scale = k1 / (2 * k2), 1 / k2
+    a, b, c, d = (jnp.sqrt(half**2 + (f - k0) * scale) - half for f in thrust)
+    return a, b, c, d
+
+
+def hover_rotor_speed(vehicle: Vehicle) -> Array:
+    """The speed, rad/s, at which four equal rotors carry the weight."""
+    f = vehicle.mass * GRAVITY / 4
+    return rotor_speed_for(vehicle, (f, f, f, f))[0]
+
+
+def rotor_wrench(plant: Plant, thrust: Rotors) -> tuple[Array, Vec3]:
+    """Collective thrust along body z, N, and torque about the body axes, N*m, from rotor arms and reaction torques."""
+    collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
+    roll, pitch = _weighted(plant.arm_y, thrust), -_weighted(plant.arm_x, thrust)
+    return collective, Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
+
+
+def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
+    """Drag in the body frame, N: -(k1 v + k2 v |v|) per axis of the body-frame air-relative velocity, m/s.
+
+    The paper writes k v v, which has no sign and pushes a vehicle that flies backwards.
+    """
+    k1, k2 = plant.drag_linear, plant.drag_quadratic
+    return air_velocity.times(k1 + air_velocity.abs().times(k2)) * -1.0
+
+
+def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
+    """Velocity relative to the air, body frame, m/s, from a velocity and a wind in the world frame, m/s."""
+    return attitude.unrotate(velocity if wind is None else velocity - wind)
+
+
+def acceleration(plant: Plant, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
+    """Acceleration of the centre of mass, world, m/s^2, from the drag, body, N, and the collective thrust, N."""
+    a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
+    return Vec3(a.x, a.y, a.z - GRAVITY)
+
+
+def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
+    """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
+    left = torque - gyroscopic_torque(plant.inertia, body_rate, plant.products)
+    return tensor_times(plant.mobility, plant.mobility_products, left)
+
+
+def tensor_times(diagonal: Vec3, products: Vec3 | None, v: Vec3) -> Vec3:
+    """Product of a symmetric tensor and a vector. `products` are the tensor's entries xy, xz and yz (None: zero)."""
+    if products is None:
+        return v.times(diagonal)
+    d, o = diagonal, products
+    return Vec3(
+        d.x * v.x + o.x * v.y + o.y * v.z, o.x * v.x + d.y * v.y + o.z * v.z, o.y * v.x + o.z * v.y + d.z * v.z
+    )  # fmt: skip
+
+
+def gyroscopic_torque(inertia: Vec3, body_rate: Vec3, products: Vec3 | None = None) -> Vec3:
+    """Gyroscopic torque w x J w, N*m. J is given by its diagonal and its entries xy, xz and yz (None: zero)."""
+    j, w = inertia, body_rate
+    if products is not None:
+        return w.cross(tensor_times(inertia, products, w))
+    return Vec3((j.z - j.y) * w.y * w.z, (j.x - j.z) * w.z * w.x, (j.y - j.x) * w.x * w.y)
+
+
+def rotor_momentum_torque(
+    inertia: Array, spin: Rotors, body_rate: Vec3, rotor_speed: Rotors, rotor_acceleration: Rotors
+) -> Vec3:
+    """Torque on the body from the angular momentum h of its rotors about body z, N*m: -(dh/dt + w x h).
+
+    A rotor turns against the air's torque on it, so h = -inertia * sum(spin * speed). The body's own inertia includes
+    the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia` is that
+    of one rotor, kg*m^2. Accelerations are in rad/s^2.
+    """
+    momentum = -inertia * _weighted(spin, rotor_speed)
+    change = -inertia * _weighted(spin, rotor_acceleration)
+    return Vec3(-body_rate.y * momentum, body_rate.x * momentum, -change)
+
+
+def accelerations(
+    plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
+) -> tuple[Vec3, Vec3]:
+    """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
+
+    Args:
+        plant: the vehicle that flies.
+        parts: its state, with the rotor speeds that produce the thrust.
+        wind: velocity of the air in the world, m/s.
+        rotor_acceleration: rad/s^2; required if the plant has rotor inertia.
+    """
+    collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
+    if plant.rotor_inertia is not None and rotor_acceleration is not None:
+        torque = torque + rotor_momentum_torque(
+            plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
+        )
+    air = air_velocity(parts.attitude, parts.velocity, wind)
+    if plant.centre is not None:  # the point at which the drag acts moves around the centre of mass
+        air = air + plant.centre.cross(parts.body_rate)
+    force = drag(plant, air)
+    if plant.centre is not None:
+        torque = torque + force.cross(plant.centre)
+    if plant.drag_torque is not None:
+        torque = torque - plant.drag_torque.times(parts.body_rate)
+    linear = acceleration(plant, parts.attitude, force, collective)
+    return linear, angular_acceleration(plant, parts.body_rate, torque)
+
+
+def derivative(plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
+    """Time derivative of the body's state. Arguments are as for `accelerations`.
+
+    The entry of the rotor speeds is zero.
+    """
+    linear, angular = accelerations(plant, parts, wind, rotor_acceleration)
+    zero = jnp.zeros_like(linear.z)
+    return Parts(
+        position=parts.velocity,
+        velocity=linear,
+        attitude=parts.attitude.derivative(parts.body_rate),
+        body_rate=angular,
+        rotor_speed=(zero, zero, zero, zero),
+    )
+
+
+def _weighted(a: Rotors, b: Rotors) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]

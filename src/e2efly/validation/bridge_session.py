@@ -1,0 +1,204 @@
+"""The bridge flying the firmware on a rig, in one process and in virtual time: the pilot is a script."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from e2efly.flight.betaflight.client import SCHEDULE, Client
+from e2efly.flight.betaflight.controller import identify
+from e2efly.flight.betaflight.link import Link, open_link
+from e2efly.flight.betaflight.settings_check import hover_schedule
+from e2efly.flight.bridge import Bridge
+from e2efly.flight.commander.commander import Commander, CommandSource
+from e2efly.flight.filter.filter import Filter
+from e2efly.flight.log_record import Log
+from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.pilot.hovering import HoverController
+from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.flight.sight.image_source import ImageSource
+from e2efly.policy.goal import Course
+from e2efly.policy.runtime import Acting, Envelope, Runtime
+from e2efly.policy.worker import PolicyWorker
+from e2efly.validation.rig import Rig
+from e2efly.vehicles.vehicle import Vehicle
+
+CONTROL_HZ = 100.0
+"""Lowest rate of the bridge, Hz."""
+PATIENCE_S = 60.0
+"""Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
+
+
+def loop_rate(control_rate: float) -> float:
+    """The lowest multiple of a policy's rate that is at least `CONTROL_HZ`."""
+    return control_rate * max(int(np.ceil(CONTROL_HZ / control_rate - 1e-9)), 1)
+
+
+@dataclass
+class Flown:
+    """The true record of a flight, sampled at every control step."""
+
+    time: list[float] = field(default_factory=list)
+    mode: list[str] = field(default_factory=list)
+    position: list[np.ndarray] = field(default_factory=list)
+    velocity: list[np.ndarray] = field(default_factory=list)
+    tilt_cosine: list[float] = field(default_factory=list)
+    goal: list[np.ndarray | None] = field(default_factory=list)
+    """The position to be at for the policy, or the hover controller's target."""
+    changes: list[tuple[float, str, tuple[str, ...]]] = field(default_factory=list)
+    """Each mode with its time and its reasons."""
+
+    def where(self, mode: str) -> np.ndarray:
+        """The steps in a mode."""
+        return np.flatnonzero(np.array(self.mode) == mode)
+
+    def errors(self, mode: str, settle: float = 0.0, last: float | None = None) -> np.ndarray:
+        """Distance to the goal in a mode, m, without its first `settle` s, or only over its `last` s."""
+        steps = self.where(mode)
+        if not len(steps):
+            return np.array([])
+        t = np.array(self.time)[steps]
+        begin = t[0] + settle if last is None else t[-1] - last
+        return np.array([
+            np.linalg.norm(self.position[i] - goal)
+            for i, at in zip(steps, t, strict=True) if at >= begin and (goal := self.goal[i]) is not None
+        ])  # fmt: skip
+
+
+class Session:
+    """A bridge on a started rig."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        settings: FlightSettings,
+        *,
+        policy: Acting | None = None,
+        course: Course | None = None,
+        log: Log | None = None,
+        link: Link | None = None,
+        wrap_worker: Callable[[PolicyWorker], Any] | None = None,
+        source: Any = None,
+        cameras: Sequence[ImageSource] = (),
+        commands: CommandSource | None = None,
+        schedule: Mapping[int, float] = SCHEDULE,
+        filtered: bool = False,
+        hover: HoverController | None = None,
+        vehicle: Vehicle | None = None,
+    ) -> None:
+        """Identify the controller, and put a bridge on its link.
+
+        `vehicle` is the vehicle that the bridge is told of. None: the vehicle that flies.
+        """
+        vehicle = vehicle or rig.world.vehicle
+        self.rig, self.settings = rig, settings
+        asked = dict(schedule) | ({} if hover is None else hover_schedule(hover))
+        self.client = Client(link or open_link(rig.sitl.msp), asked)
+        self.info = identify(self.client, 3.0, clock=rig)
+        self.worker: PolicyWorker | None = None
+        rate = CONTROL_HZ
+        if policy is not None and course is not None:
+            rate = loop_rate(policy.contract.control_rate_hz)
+            runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras))
+            self.worker = PolicyWorker(runtime, PATIENCE_S)
+        late = rig.latency + 0.01
+        self.commander = None if commands is None else Commander(commands, vehicle, settings, latency=late)
+        """The source of commands that flies in place of a policy."""
+        self.period = 1 / rate
+        self.source = source or PlantSource(rig.poses, "rig")
+        self.bridge = Bridge(
+            self.client, self.info, self.source, vehicle, settings,
+            worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
+            filter=Filter.of(vehicle, settings.fence, late) if filtered else None, hover=hover,
+        )  # fmt: skip
+        self.flown = Flown()
+        self.lateness = 0.0
+        """Lateness that is reported to the bridge at the next step, s."""
+
+    def close(self) -> None:
+        """End the policy's thread and the link."""
+        if self.worker is not None:
+            self.worker.close()
+        self.client.link.close()
+
+    def step(self) -> None:
+        """Run one control period."""
+        self.rig.sleep(self.period)
+        self.bridge.tick(self.rig.now(), self.lateness)
+        self.lateness = 0.0
+        flown, bridge, state = self.flown, self.bridge, self.rig.state
+        mode = str(bridge.flight.mode)
+        if not flown.mode or flown.mode[-1] != mode:
+            flown.changes.append((self.rig.now(), mode, tuple(str(r) for r in bridge.flight.reasons)))
+        flown.time.append(self.rig.now())
+        flown.mode.append(mode)
+        flown.position.append(np.array(state.position))
+        flown.velocity.append(np.array(state.velocity))
+        _, x, y, _ = np.asarray(state.quaternion)
+        flown.tilt_cosine.append(float(1 - 2 * (x * x + y * y)))
+        flown.goal.append(self._goal())
+
+    def fly(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Run control steps for `seconds`, or until a condition holds. Returns whether it holds."""
+        return run(self.rig, self.step, seconds, until)
+
+    def in_mode(self, *modes: Mode) -> Callable[[], bool]:
+        """A condition: the bridge is in one of these modes."""
+        return lambda: self.bridge.flight.mode in modes
+
+    def take_off(self, settle: float = 2.0) -> bool:
+        """The pilot hands over control, arms, and requests a hover. Returns whether it is reached."""
+        self.fly(0.3)
+        self.rig.set(override=True, throttle=0.0)
+        self.fly(0.3)
+        self.rig.set(armed=True)
+        self.fly(0.5)
+        self.rig.set(mission="hover")
+        height = self.settings.takeoff_height / self.settings.takeoff_speed
+        return self.fly(height + 8.0, self.in_mode(Mode.HOVER)) and not self.fly(settle, self.in_mode(Mode.LAND))
+
+    def land(self, patience: float = 30.0) -> bool:
+        """The pilot requests a landing, and disarms after it. Returns whether the vehicle is landed and disarmed."""
+        self.rig.set(mission="land")
+        landed = self.fly(patience, self.in_mode(Mode.DONE))
+        self.rig.set(armed=False)
+        self.fly(0.5)
+        return landed
+
+    def _goal(self) -> np.ndarray | None:
+        place, _ = self.bridge.setpoint
+        return None if place is None else np.array(place)
+
+
+def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
+    """Run steps for `seconds` of the rig's time, or until a condition holds. Returns whether it holds."""
+    end = rig.now() + seconds
+    while rig.now() < end:
+        step()
+        if until():
+            return True
+    return False
+
+
+def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
+    """Settings of whole flights on the rig. The firmware on the rig has no battery.
+
+    Args:
+        height: height of the hover above the ground, m.
+        reach: radius of the fence about the origin, m.
+    """
+    fence = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
+    return dataclasses.replace(
+        FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True, fence=fence,
+    )  # fmt: skip
+
+
+def flight_folder(base: Path, name: str) -> Path:
+    """Make a folder for one firmware."""
+    folder = base / name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,159 @@
+"""Fly a policy on a plant, and record it. Imports no JAX."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from e2efly.control.vectors import Quat, Vec3
+from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
+from e2efly.validation.plant import Delay, Plant, RigidState
+from e2efly.validation.reality import Air
+from e2efly.vehicles.vehicle import GRAVITY
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A moment of a flight, for a log."""
+
+    time: float
+    """Since the start, s."""
+    state: RigidState
+    """The vehicle."""
+    rotor_speed: np.ndarray
+    """(4,) rad/s. NaN if the plant does not give rotor speeds."""
+
+    @staticmethod
+    def of(plant: Plant, time: float) -> "Sample":
+        """The sample of a plant now."""
+        speed = np.asarray(getattr(plant, "rotor_speed", np.full(4, np.nan)), np.float64)
+        return Sample(time, RigidState.of(plant.state), speed.copy())
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A flight: `t` control steps, float64. Step k leads from row k of the states to row k + 1."""
+
+    time: np.ndarray
+    """(t+1,) since the start, s."""
+    position: np.ndarray
+    """(t+1, 3) world, m."""
+    velocity: np.ndarray
+    """(t+1, 3) world, m/s."""
+    quaternion: np.ndarray
+    """(t+1, 4) wxyz, body to world."""
+    body_rate: np.ndarray
+    """(t+1, 3) body, rad/s."""
+    observation: np.ndarray
+    """(t, o) the policy's observations."""
+    action: np.ndarray
+    """(t, 4) the policy's actions, in [-1, 1]."""
+    command: np.ndarray
+    """(t, 4) the actions in the units of the command mode. Each acts a latency later."""
+    goal: np.ndarray
+    """(t, 3) the position to be at, world, m."""
+    success: bool = False
+    """The task's verdict, from the runtime."""
+    failure: str = ""
+    """Why the task failed in flight. Empty: it did not fail."""
+    fault: str = ""
+    """Why the flight ended early, if the policy or the plant could not go on."""
+    samples: tuple[Sample, ...] = ()
+    """Moments between control steps, if they were requested."""
+
+
+def fly(
+    runtime: Runtime,
+    plant: Plant,
+    start: RigidState,
+    duration: float,
+    latency: float,
+    air: Air | None = None,
+    sample: float | None = None,
+    images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
+) -> Trajectory:
+    """Fly from one start until the time is over, or the task is done or has failed.
+
+    Args:
+        runtime: policy, contract and course.
+        plant: the plant to fly.
+        start: the state at the start.
+        duration: longest flight, s, in whole control periods.
+        latency: time from observation to command, s.
+        air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
+        sample: longest time between two samples, s. None: no samples are kept.
+        images: the cameras' images, by control step and the states until then (`e2efly.validation.plant_sight.Watch.images`).
+
+    Returns:
+        The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
+
+    Raises:
+        ValueError: for a start, duration or latency that cannot be flown.
+    """
+    contract = runtime.policy.contract
+    period = 1 / contract.control_rate_hz
+    steps = math.ceil(duration / period - 1e-6) if math.isfinite(duration) else 0
+    if steps < 1:
+        raise ValueError(f"duration is {duration} s; accepted: one control period or more, {period:.4g} s")
+    disturbed = air is not None and air.disturbs
+    hover = runtime.low + (np.array(contract.hover_action) + 1) / 2 * runtime.span
+    delay = Delay.of(latency, hover)
+    plant.reset(start)
+    states, decisions, fault = [plant.state], [], ""
+    samples = [] if sample is None else [Sample.of(plant, 0.0)]
+    memory = begin(runtime, states[0].odometry(0.0), 0.0)
+    for k in range(steps):
+        now, then = k * period, (k + 1) * period
+        try:
+            truth = states[-1].odometry(now)
+            measured = imu_of(states[max(k - 1, 0)], states[k], period)
+            seen = None if air is None else air.seen(k, truth)
+            shown = () if images is None else images(k, states)
+            memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown)
+            if memory.done or memory.failure:
+                break
+            delay, parts = delay.send(decision.command, now).until(now, then)
+            if disturbed and air is not None:
+                plant.disturb(air.wind[k], air.rotor_share[k])
+            at = now
+            for command, seconds in parts:
+                count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
+                for _ in range(count):
+                    plant.step(command, seconds / count)
+                    at += seconds / count
+                    if sample is not None:
+                        samples.append(Sample.of(plant, at))
+            reached = RigidState.of(plant.state)
+        except (ValueError, OSError) as error:
+            fault = f"after {now:.2f} s: {error}"
+            break
+        decisions.append(decision)
+        states.append(reached)
+    if not (memory.done or memory.failure):
+        memory = judged(runtime, memory, states[-1].odometry(period * len(decisions)), period * len(decisions))
+    return Trajectory(
+        period * np.arange(len(states)),
+        *(np.array([getattr(s, name) for s in states]) for name in ("position", "velocity", "quaternion", "body_rate")),
+        *(_rows(decisions, name, size) for name, size in
+          (("observation", contract.observation_size), ("action", 4), ("command", 4), ("position", 3))),
+        success=memory.outcome is not None and bool(memory.outcome.success[0]),
+        failure=memory.failure,
+        fault=fault,
+        samples=tuple(samples),
+    )  # fmt: skip
+
+
+def imu_of(before: RigidState, after: RigidState, dt: float) -> Imu:
+    """The measurement of a perfect IMU, as in training (`e2efly.simulation.sensors.imu`).
+
+    It is the body rate, and the mean specific force of the last `dt` s in the present body axes. A vehicle that has
+    just been placed does not accelerate.
+    """
+    pull = Vec3.of((after.velocity - before.velocity) / dt + np.array([0.0, 0.0, GRAVITY]))
+    force = Quat.of(after.quaternion).unrotate(pull)
+    return Imu(after.body_rate, np.array([force.x, force.y, force.z]))
+
+
+def _rows(decisions: list, name: str, size: int) -> np.ndarray:
+    return np.array([getattr(d, name) for d in decisions], np.float64).reshape(len(decisions), size)

@@ -1,0 +1,127 @@
+"""What a vehicle on a plant sees: the world of its task, rendered at the plant's true pose. Imports JAX.
+
+Rate, age, mounting and noise of the images are those of the training environment. Its cameras draw them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, PRNGKeyArray
+
+from e2efly.config import CameraConfig
+from e2efly.simulation.physics import State
+from e2efly.simulation.scenes.scene import Scene
+from e2efly.simulation.sensors.eyes import Eye, see, steps_between
+from e2efly.simulation.sensors.latency import delayed_state, frames
+from e2efly.validation.plant import RigidState, Shutter
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The cameras of one flight and the world that they look at.
+
+    All numbers are NumPy numbers, to be passed to processes.
+    """
+
+    cameras: tuple[CameraConfig, ...]
+    """In the order of the contract's images."""
+    eyes: tuple[Eye, ...]
+    """How each camera is mounted on this vehicle: leaves (1, ...)."""
+    scene: Scene
+    """One world. It moves with the time since the start."""
+    period: float
+    """Control period, s."""
+    oldest: float
+    """Largest age of an image over all flights, s. It sets shapes."""
+    seed: int
+    """Seed of the noise."""
+
+    def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "Watch":
+        """The watch for a flight that begins.
+
+        Args:
+            taken: for the plant's own cameras: by the camera's number, a function from the time since the start, s, to
+                the newest image. None: all images are rendered.
+        """
+        return Watch(self, taken or {})
+
+    def shutter(self, i: int) -> Shutter:
+        """The exposure times of camera `i`."""
+        return Shutter(self.period * self.steps_between(i), float(self.eyes[i].latency[0]))
+
+    def steps_between(self, i: int) -> int:
+        """Control steps from one image of camera `i` to the next."""
+        every = self.eyes[i].every
+        return steps_between(self.cameras[i], self.period) if every is None else int(every[0])
+
+
+@dataclass
+class Watch:
+    """The images of a flight, from control step to control step."""
+
+    sight: Sight
+    """The cameras and the world."""
+    taken: Mapping[int, Callable[[float], np.ndarray]] = field(default_factory=dict)
+    """Functions that give the newest image of each of the plant's own cameras."""
+    shown: list[np.ndarray] = field(default_factory=list)
+    """The last image of each camera."""
+
+    def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
+        """The policy's images in control step `k`: for each camera the newest image, (h, w) or (h, w, 3).
+
+        Args:
+            k: the step. Steps must be requested in order.
+            states: states of the vehicle, one per control step until now. The last one is the present state.
+        """
+        sight = self.sight
+        for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
+            if k % sight.steps_between(i) and self.shown:
+                continue
+            if i in self.taken:
+                self.shown[i : i + 1] = [self.taken[i](k * sight.period)]
+                continue
+            newest = [states[max(len(states) - 1 - age, 0)] for age in range(frames(sight.oldest, sight.period) + 1)]
+            key = jax.random.fold_in(jax.random.fold_in(jax.random.key(sight.seed), k), i)
+            image = rendered(camera, eye, sight.scene, newest, k * sight.period, sight.period, key)
+            self.shown[i : i + 1] = [image]
+        return self.shown
+
+
+def rendered(
+    camera: CameraConfig,
+    eye: Eye,
+    scene: Scene,
+    states: Sequence[RigidState],
+    now: float,
+    period: float,
+    key: PRNGKeyArray,
+) -> np.ndarray:
+    """A camera's image as the environment renders it, from the pose and the world of a latency ago.
+
+    Args:
+        camera: the camera.
+        eye: how it is mounted on the vehicle: leaves (1, ...).
+        scene: one world.
+        states: states of the vehicle, a period apart, newest first, back to the eye's latency ago.
+        now: time of the newest state, s.
+        period: time between the states, s.
+        key: key of the noise.
+    """
+
+    def column(name: str) -> Array:
+        return jnp.asarray([[getattr(state, name) for state in states]], jnp.float32)
+
+    rotors = jnp.zeros((1, len(states), 4), jnp.float32)  # no camera depends on the rotor speeds
+    past = State(column("position"), column("velocity"), column("quaternion"), column("body_rate"), rotors)
+    return np.asarray(_see(camera, eye, scene, past, now, period, key))[0]
+
+
+@jax.jit
+def _see(
+    camera: CameraConfig, eye: Eye, scene: Scene, past: State, now: float, period: float, key: PRNGKeyArray
+) -> Array:
+    then = jnp.maximum(now - eye.latency, 0.0)
+    return see(camera, eye, scene.at(then), delayed_state(past, eye.latency, period), key)

@@ -1,0 +1,52 @@
+"""All figures of a flight, from its log."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from e2efly.logs.blackbox import Alignment, Blackbox, align, read_blackbox
+from e2efly.logs.flight_log import FlightLog
+from e2efly.viewing import flight_health as health
+from e2efly.viewing import flight_report as report
+from e2efly.viewing.flight_data import blackbox_responses, gyro, responses
+
+
+def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = None) -> list[Path]:
+    """Draw the figures of a flight for which data was recorded, into a folder. Returns their paths."""
+    estimates = {"log": responses(log)} | ({"blackbox": blackbox_responses(laid[0])} if laid else {})
+    figures: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {
+        "track": (("odometry",), lambda path: report.plot_tracks(log, path)),
+        "motion": (("odometry", "mode"), lambda path: report.plot_motion(log, path)),
+        "rates": (("command",), lambda path: report.plot_rates(log, path)),
+        "response": (("command",), lambda path: report.plot_response(estimates, path)),
+        "loop": (("timing", "policy", "status"), lambda path: health.plot_loop(log, path)),
+        "health": (("battery", "link", "odometry"), lambda path: health.plot_health(log, path)),
+        "throttle": (("sticks", "throttle_map"), lambda path: health.plot_throttle(log, path)),
+    }
+    paths = []
+    for name, (channels, plot) in figures.items():
+        if any(channel in log.series for channel in channels):
+            paths.append(out / f"{name}.png")
+            plot(paths[-1])
+    if laid:
+        paths.append(out / "blackbox.png")
+        health.plot_blackbox(log, *laid, paths[-1])
+    return paths
+
+
+def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, Alignment]:
+    """The session of a blackbox log that belongs to this flight, and its alignment in time.
+
+    Raises:
+        ValueError: when no session belongs to this flight.
+    """
+    time, rate, _ = gyro(log)
+    found: list[tuple[Blackbox, Alignment]] = []
+    reasons: list[str] = []
+    for session in read_blackbox(path):
+        try:
+            found.append((session, align(time, rate, session)))
+        except ValueError as error:
+            reasons.append(str(error))
+    if not found:
+        raise ValueError(f"{path}: no session is of the flight of {log.path}: {'; '.join(reasons)}")
+    return max(found, key=lambda pair: pair[1].correlation * pair[1].overlap)

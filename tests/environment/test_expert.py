@@ -1,0 +1,94 @@
+"""The expert that the term `imitate` compares with: it knows where it will be, and flies."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import EnvConfig, RewardConfig
+from e2efly.environment import Env, EnvState, expert, random_key
+from e2efly.environment.episodes import UnderWay
+from e2efly.simulation import rewards
+from e2efly.tasks import TASKS
+
+IMITATE = RewardConfig({"imitate": 1.0})
+
+
+def forests(speed: float, **env: object) -> Env:
+    task = dataclasses.replace(TASKS["avoid"](), speed=(speed, speed))
+    return Env.of(task, IMITATE, EnvConfig(**env))
+
+
+def begun(env: Env, seed: int, n: int) -> tuple[EnvState, jax.Array]:
+    return jax.jit(env.reset, static_argnums=1)(random_key(seed), n)
+
+
+@pytest.mark.whole(but=1)
+@pytest.mark.parametrize("latency", [0.02, 0.06, 0.1])
+def test_it_knows_where_the_vehicle_will_be_when_its_action_acts(latency: float) -> None:
+    env, n = forests(5.0, control_rate=100.0, action_latency=(latency, latency)), 40
+    state, _ = begun(env, 0, n)
+    rng = np.random.default_rng(0)
+    step, actions = jax.jit(env.step, static_argnames="restart"), np.tile(np.asarray(env.hover), (n, 1))
+    for _ in range(30):
+        actions = np.clip(actions + rng.normal(0, 0.1, (n, 4)) * [0.5, 1, 1, 1], -0.8, 0.8)
+        state, _ = step(state, jnp.asarray(actions, jnp.float32), restart=False)
+    told = expert.ahead(
+        env.physics.nominal, state.vehicle, env.command(state.actions), state.action_latency, env.control_period
+    )
+    now = state.vehicle
+    for _ in range(round(latency * 100)):
+        state, _ = step(state, jnp.asarray(actions, jnp.float32), restart=False)
+    for found, was, truth in (
+        (told.position, now.position, state.vehicle.position),
+        (told.velocity, now.velocity, state.vehicle.velocity),
+        (told.attitude, now.quaternion, state.vehicle.quaternion),
+    ):
+        error = np.linalg.norm(found.stack() - truth, axis=1)
+        assert error.mean() < 0.25 * np.linalg.norm(was - truth, axis=1).mean()
+
+
+@pytest.mark.whole
+def test_flown_as_a_pilot_it_passes_forests_at_the_commanded_speed() -> None:
+    env, n = forests(8.0), 60
+    state, observation = begun(env, 1, n)
+
+    def fly(flight: UnderWay, _: None) -> tuple[UnderWay, None]:
+        return flight.after(env, env.expert_action(flight.state), 0.0), None
+
+    flight, _ = jax.jit(lambda f: jax.lax.scan(fly, f, None, length=300))(UnderWay.of(state, observation))
+    flown = flight.episodes(env)
+    assert np.mean(flown.success) > 0.85
+    assert np.mean(flown.mean_speed) > 0.85 * 8.0
+
+
+def test_its_own_action_costs_nothing_and_any_other_does() -> None:
+    env = forests(8.0)
+    state, _ = begun(env, 2, 8)
+    action = jax.jit(env.expert_action)(state)
+    step = jax.jit(env.step)
+    cost = [step(state, action + off)[1].terms["imitate"] for off in (0.0, 0.1)]
+    np.testing.assert_allclose(cost[0], 0.0, atol=1e-6)
+    assert (np.asarray(cost[1]) < -0.1).all()
+
+
+def test_a_heavier_vehicle_is_given_more_thrust() -> None:
+    env = forests(8.0, randomize={"mass": 0.2})
+    state, _ = begun(env, 3, 16)
+    even = dataclasses.replace(state, plant={"mass": jnp.full(16, env.physics.nominal.mass)})
+    ratio = env.command(env.expert_action(state))[:, 0] / env.command(env.expert_action(even))[:, 0]
+    np.testing.assert_allclose(ratio, state.plant["mass"] / env.physics.nominal.mass, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("task", "mode"), [("hover", "ctbr"), ("avoid", "velocity")])
+def test_where_there_is_no_expert_the_term_is_refused_by_name(task: str, mode: str) -> None:
+    env = Env.of(TASKS[task](), IMITATE, EnvConfig(command_mode=mode))
+    state, _ = jax.eval_shape(lambda key: env.reset(key, 2), random_key(4))
+    with pytest.raises(ValueError, match="'imitate' needs expert_action, which this task does not have"):
+        jax.eval_shape(env.step, state, jnp.zeros((2, 4)))
+
+
+def test_the_term_is_known() -> None:
+    assert rewards.TERMS["imitate"].inputs == ["action", "expert_action"]
