@@ -4,11 +4,13 @@
 
 Each vehicle is drawn about the file (mass 20 %, thrust 12 %, inertia 30 % an axis, motor lag 40 %, drag 50 %, torque
 ratio 20 %, rate gain 30 %, delay 20 to 80 ms, sag up to 8 %), flown for 30 s in MuJoCo by a flight controller that
-believes in the file, and identified from the log of its sensors (`e2efly.validation.plant_excitation`). Its mass is weighed.
+believes in the file, and identified from the log of its sensors (`e2efly.validation.plant_excitation`). Its mass is
+weighed.
 
-`--plant betaflight` flies them by the bridge's excitation mode through the real firmware (`e2efly.validation.firmware_excitation`),
-and identifies each twice: from the flight log alone, and with the firmware's blackbox laid over it. The delay is
-compared with the one on the rig's own clock: the age of the poses, and the time from a command to the setpoint.
+`--plant betaflight` flies them by the bridge's excitation mode through the real firmware
+(`e2efly.validation.firmware_excitation`), and identifies each twice: from the flight log alone,
+and with the firmware's blackbox laid over it. The delay is compared with the one on the rig's own clock: the age of
+the poses, and the time from a command to the setpoint.
 `--first` is the seed of the first vehicle. A flight that ends before its excitation does is named in the JSON file,
 and has no errors to count.
 """

@@ -102,7 +102,10 @@ def test_the_wheel_has_the_bridge_and_the_zoo_and_not_the_page(tmp_path: Path) -
 
 def test_it_looks_at_a_controller_without_jax(slim: Path, tmp_path: Path) -> None:
     """With `--check`, for a policy of the zoo."""
-    code = "import sys; from e2efly.commands.cli import run; s = run(sys.argv[1:]); print('modules', *sys.modules); sys.exit(s)"
+    code = (
+        "import sys; from e2efly.commands.cli import run; s = run(sys.argv[1:]); print('modules', *sys.modules);"
+        "sys.exit(s)"
+    )
     with controller(recorded) as client:
         command = [slim, "-c", code, "fly", "hover", "--check", "--link", client.link.name]  # type: ignore[attr-defined]
         done = subprocess.run(

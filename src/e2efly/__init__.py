@@ -63,12 +63,14 @@ if _too_late:  # ONNX Runtime reads its variable once, while it is imported
     )
 
 _FACE = {
-    "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant", "evaluate": "e2efly.validation.evaluation",
+    "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant",
+    "evaluate": "e2efly.validation.evaluation",
     "export": "e2efly.adapters.export_policy",
     "list_tasks": "e2efly.api", "load_policy": "e2efly.policy.loader", "load_vehicle": "e2efly.vehicles",
     "make_env": "e2efly.api", "preset": "e2efly.api", "register_algorithm": "e2efly.config.algorithms:register",
     "register_plant": "e2efly.validation.plants:register",
-    "register_reward": "e2efly.simulation.rewards:register", "register_task": "e2efly.tasks:register", "train": "e2efly.api",
+    "register_reward": "e2efly.simulation.rewards:register", "register_task": "e2efly.tasks:register",
+    "train": "e2efly.api",
     "validate": "e2efly.validation.plant_validation",
     "register_pose_source": "e2efly.flight.pose.registry:register",
 }  # fmt: skip

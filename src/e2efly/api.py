@@ -119,8 +119,8 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
 
     Args:
         task: the task.
-        num_envs: None returns the functional JAX environment, `e2efly.environment.Env`. A number returns a Gymnasium vector
-            environment with this many vehicles (needs the extra `gym`).
+        num_envs: None returns the functional JAX environment, `e2efly.environment.Env`. A number returns a Gymnasium
+            vector environment with this many vehicles (needs the extra `gym`).
         options: fields of `EnvConfig`, such as vehicle, wind or randomize.
 
     Raises:

@@ -100,7 +100,8 @@ def test_no_list_or_table_is_shown_as_text(site: Path) -> None:
 def test_the_reference_has_what_import_e2efly_offers(pages: dict[Path, Page]) -> None:
     ids = {anchor for path, page in pages.items() if path.parent.name == "reference" for anchor in page.ids}
     wanted = {
-        "e2efly.api.train", "e2efly.validation.evaluation.evaluate", "e2efly.validation.plant_validation.validate", "e2efly.policy.goal.Goal",
+        "e2efly.api.train", "e2efly.validation.evaluation.evaluate",
+        "e2efly.validation.plant_validation.validate", "e2efly.policy.goal.Goal",
         "e2efly.policy.loader.load_policy", "e2efly.validation.plant.Plant", "train", "eval",
         "e2efly.config.run.TrainConfig", "e2efly.simulation.physics.step.step",
     }  # fmt: skip

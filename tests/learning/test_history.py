@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from e2efly.learning import history
+from e2efly.runs.rundir import RunDirectory
 
 
 @pytest.mark.parametrize("chunks", [1, 40, 64, 65, 1000])
@@ -25,7 +26,7 @@ def test_a_policy_is_found_again(tmp_path: Path) -> None:
         history.keep(tmp_path / "history", update, scaled, 0.5)
     assert history.kept(tmp_path / "history") == [10, 20, 30]
     assert history.policy_at(tmp_path / "history", 20, weights)["head"][0][0][0, 0] == 20
-    history.forget_after(tmp_path / "history", 20)
+    RunDirectory(tmp_path).forget_after(20)
     assert history.kept(tmp_path / "history") == [10, 20]
 
 

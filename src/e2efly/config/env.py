@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED, number
-from e2efly.policy.contract_json import LATEST
+from e2efly.config.numbers import ANGLE, BODY_RATE, LATEST, SPEED, number
 
 
 @dataclass(frozen=True)

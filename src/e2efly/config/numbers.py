@@ -15,6 +15,9 @@ SMALLEST = 1e-9
 float32."""
 SPEED, BODY_RATE, ANGLE = 100.0, 100.0, math.pi
 """Largest speed, m/s, rate of turning, rad/s, and angle, rad, of what a configuration asks for."""
+LATEST = 1.0
+"""Longest delay with which an environment trains, s. No vehicle flies with an older state, or so long after a
+command."""
 MOST = 2**31 - 1
 """The largest whole number, unless a rule says otherwise."""
 

@@ -47,7 +47,7 @@ class EnvState:
     eyes: tuple[Eye, ...]
     """How the cameras are mounted, camera by camera."""
     images: tuple[Float[Array, "n *image"], ...]
-    """The newest image of each camera, without gradient. `e2efly.simulation.sensors.eyes.see` describes what it shows."""
+    """The newest image of each camera, without gradient. `sensors.eyes.see` tells what it shows."""
     key: PRNGKeyArray
     tick: Int[Array, ""]
     """Steps since `reset`. Together with the key, it seeds everything random."""

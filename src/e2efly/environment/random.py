@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, PRNGKeyArray
 
 UNSEEN = 4
-"""The stream of the starts of `e2efly eval` and `validate`. Lower streams are for training (`e2efly.learning.judge`)."""
+"""The stream of the starts of `e2efly eval` and `validate`. Lower streams are for training (`learning/judge.py`)."""
 GENERATOR = "rbg"
 """XLA's own random generator: it compiles in a seventh of the time of JAX's default."""
 

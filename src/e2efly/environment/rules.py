@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from e2efly.config import EnvConfig, TaskConfig, check_fields
-from e2efly.policy.contract_json import LATEST
+from e2efly.config.numbers import LATEST
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
 from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown

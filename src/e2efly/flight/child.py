@@ -14,7 +14,7 @@ from typing import TypeVar
 from e2efly.flight.lines import Lines
 from e2efly.flight.process import printable
 
-SCRIPTS = Path(__file__).parent / "process"
+SCRIPTS = Path(__file__).parent / "scripts"
 """Where the scripts are."""
 OPENING = 15.0
 """The longest time until a script is ready, s."""

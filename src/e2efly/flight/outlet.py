@@ -13,7 +13,7 @@ from typing import Any
 from e2efly.flight.child import OPENING
 from e2efly.flight.process import printable
 
-SCRIPT = Path(__file__).parent / "process" / "live.py"
+SCRIPT = Path(__file__).parents[1] / "logs" / "scripts" / "live.py"
 """The script that runs in the process."""
 BUFFER = 1 << 20
 """Bytes of records that the kernel is asked to buffer for the process: some seconds of flight."""

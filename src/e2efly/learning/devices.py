@@ -79,7 +79,7 @@ def on_each(
         returns: the same for the result.
         donate: arguments whose memory the result may use.
         axis: name of the axis of the devices: `AXIS` if their parts belong to one run.
-        vehicles: number of vehicles that a device steps together, if known. See `e2efly.simulation.device.wide_vectors`.
+        vehicles: number of vehicles that a device steps together, if known. See `device.wide_vectors`.
     """
     takes, returns = (
         jax.tree.map(lambda place: SAME if place == SAME else PartitionSpec(axis), x) for x in (takes, returns)

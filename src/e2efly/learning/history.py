@@ -61,10 +61,3 @@ def policy_at(folder: Path, update: int, like: Any) -> Weights:
         ValueError: when the file is damaged, or belongs to another network.
     """
     return load_checkpoint(folder / f"{update:08d}{_SUFFIX}", like)
-
-
-def forget_after(folder: Path, update: int) -> None:
-    """Delete the policies of updates that a resumed run will do again."""
-    for number in kept(folder):
-        if number > update:
-            (folder / f"{number:08d}{_SUFFIX}").unlink()

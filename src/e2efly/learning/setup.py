@@ -49,7 +49,7 @@ class Setup:
         return setup
 
     def check(self, members: int = 1) -> None:
-        """Refuse a configuration if `members` such runs, trained together, exceed a limit (`e2efly.learning.run_budget`)."""
+        """Refuse a configuration if `members` such runs, trained together, exceed a limit (`run_budget.py`)."""
         judged = self.episode_steps * len(self.judges)
         check_run(self.config, self.env, self.actor, self.updates, judged, members)
 

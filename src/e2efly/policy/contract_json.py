@@ -5,15 +5,13 @@ from collections.abc import Collection
 from typing import Any
 
 from e2efly.config.names import nearest
+from e2efly.config.numbers import LATEST
 from e2efly.config.tables import shown
 
 LARGEST = 1e6
 """Largest magnitude of a number, in any unit."""
 LONGEST = 2000
 """Largest length of a text."""
-LATEST = 1.0
-"""Longest delay with which an environment trains, s. No vehicle flies with an older state, or so long after a
-command."""
 
 
 def table(value: Any, where: str, kind: type) -> dict[str, Any]:

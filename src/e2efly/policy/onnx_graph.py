@@ -334,5 +334,5 @@ OPERATORS: dict[str, tuple[Callable[[Node], Made], Sequence[int], dict[str, Any]
     "Conv": (_convolution, (3,), _WINDOW),
 }
 """Operators by name: their shapes, how many inputs they have, and their attributes: a list that must be there, an
-integer that must be there, or a number with its default. These are the operators that `e2efly.learning.onnx_layers` writes, in
-the forms in which it writes them."""
+integer that must be there, or a number with its default. These are the operators that `learning/onnx_layers.py`
+writes, in the forms in which it writes them."""

@@ -18,7 +18,7 @@ import onnxruntime as ort
 
 from e2efly.config.storage import cache_folder
 
-SCRIPT = Path(__file__).parents[1] / "process" / "first_run.py"
+SCRIPT = Path(__file__).with_name("first_run.py")
 """What runs in the other process."""
 SECONDS, MIB = 20, 1024
 """Limits of time and memory for loading a network and running it once."""

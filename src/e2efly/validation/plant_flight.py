@@ -83,7 +83,7 @@ def fly(
         latency: time from observation to command, s.
         air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
         sample: longest time between two samples, s. None: no samples are kept.
-        images: the cameras' images, by control step and the states until then (`e2efly.validation.plant_sight.Watch.images`).
+        images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.

@@ -43,8 +43,8 @@ def stress(
 ) -> Report:
     """Fly a policy with the bridge's runtime on a plant, in every row that the plant can simulate.
 
-    The starts, and the draws of a row, are those of `e2efly.validation.stress.stress`. The random sequences of gusts, drift and
-    noise in flight are different ones.
+    The starts, and the draws of a row, are those of `stress.stress`. The random sequences of gusts, drift and noise in
+    flight are different ones.
 
     Args:
         policy: a run directory, a policy.onnx, or the name of a task, which means the policy of the zoo for that task.

@@ -103,7 +103,7 @@ class DistanceGrid:
 def clearance(
     grid: DistanceGrid, position: Float[Array, "n 3"], time: Float[Array, " n"] | None = None
 ) -> Float[Array, " n"]:
-    """Signed distance of points to the nearest surface, m, negative inside: `e2efly.simulation.scenes.scene.clearance` for a grid.
+    """Signed distance of points to the nearest surface, m, negative inside: `scene.clearance` for a grid.
 
     It is trilinear between the points of the grid, and differentiable. Outside the grid, the distance to the grid is
     added to the value at its border. The result may be too large there, but never too small.

@@ -1,4 +1,4 @@
-"""Camera rays against one world of triangles. The call is that of `e2efly.simulation.scenes.cast.cast`, computed by an engine.
+"""Camera rays against one world of triangles. The call is that of `scenes.cast.cast`, computed by an engine.
 
 Triangles are surfaces. They are visible from both sides, and nothing is inside them. A camera inside an object sees the
 object's inner side. This differs from a solid of `e2efly.simulation.scenes.scene`, where all depth is 0.
