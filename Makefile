@@ -58,7 +58,7 @@ docs: $(DOCS_READY)
 	$(BIN)/python docs/notebook_pages.py
 	@$(MAKE) --no-print-directory site
 
-# The variable leaves out a notice of the end of MkDocs Material (docs/architecture.md).
+# The variable leaves out a notice of the end of MkDocs Material (docs/decisions.md).
 site: $(DOCS_READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "The site: site/index.html. Its search needs a server: $(BIN)/python -m http.server --directory site"

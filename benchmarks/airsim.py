@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from common import arguments, table, with_earlier, write
 
 import e2efly
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 def main() -> None:

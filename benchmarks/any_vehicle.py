@@ -16,7 +16,7 @@ from common import arguments, table, with_earlier, write
 import e2efly
 from e2efly.policy.zoo import FOLDER
 from e2efly.validation.evaluation import Evaluation
-from e2efly.vehicles import vehicle_names
+from e2efly.vehicles.loading import vehicle_names
 
 DELAYS = (0.0, 0.03, 0.06, 0.09, 0.12)
 """s."""

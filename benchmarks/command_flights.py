@@ -20,8 +20,8 @@ from tests.flight.command_streams import Loopback
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 
 SPEED = 0.5
 """Of what moves, m/s."""

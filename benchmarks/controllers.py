@@ -32,8 +32,9 @@ from e2efly.validation.plant import Delay, RigidState
 from e2efly.validation.plant_flight import imu_of
 from e2efly.validation.rig import POSE_NOISE, Rig
 from e2efly.validation.speeds import SpeedLink
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 NAMES = ("pid", "geometric", "indi", "mpc")
 POSES, LINK, PERIOD = 0.03, 0.01, 0.01

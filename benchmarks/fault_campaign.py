@@ -34,7 +34,7 @@ from e2efly.config.storage import read_json, write_json
 from e2efly.policy.loader import load_policy
 from e2efly.simulation.device import cores
 from e2efly.validation import firmware_program
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 KEPT = Path(tempfile.gettempdir()) / "e2efly-fault-campaign"
 

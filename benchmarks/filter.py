@@ -32,8 +32,8 @@ from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation.plant_validation import validate
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE, LATENCY, FASTEST = "vis_r", 0.09, 10.0
 SECONDS, BATCH = 8.0, 1000

@@ -17,7 +17,7 @@ from e2efly.flight.settings import Fence
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 FENCE = Fence(low=(-2.5, -2.5, 0.4), high=(2.5, 2.5, 3.5), speed=5.0, tilt=1.2)
 LATENCY, SECONDS = 0.08, 2.5

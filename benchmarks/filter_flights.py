@@ -25,8 +25,8 @@ from e2efly.policy.runtime import Imu, Runtime, act, begin
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.step import Physics, step
 from e2efly.tasks.route import course_for
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 RATE = 100.0
 """Control steps a second, Hz."""

@@ -21,7 +21,7 @@ from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 def virtual(policy_file: Path, folder: Path, seed: int, only: list[str]) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from rich.console import Console
 from e2efly.commands.rehearsals import flight_row, fly_whole
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation.evaluation import candidate
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 def main() -> None:

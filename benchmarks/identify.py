@@ -36,7 +36,8 @@ from e2efly.validation.bridge_session import rehearsal_settings
 from e2efly.validation.firmware_excitation import fly_excited
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 INTERVAL = 1.645
 """Standard deviations of the interval that holds 90 %."""

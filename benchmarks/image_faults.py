@@ -12,7 +12,7 @@ from tests.faults.image_faults import FAULTS, UPSIDE_DOWN, fly_with
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import candidate
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 def main() -> None:

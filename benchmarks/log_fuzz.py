@@ -16,7 +16,7 @@ from tests.mutations import Endured, mutated
 
 from e2efly.alignment.checks import checked
 from e2efly.logs.readers import read_flights
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 MEMORY = 1.0
 """Largest memory of the process, GB."""

@@ -37,9 +37,8 @@ from e2efly.simulation.physics.body import hover_rotor_speed
 from e2efly.simulation.physics.rotation import from_euler, multiply, yaw
 from e2efly.tasks.hover import HoverConfig
 from e2efly.validation.evaluation import act_of, candidate, episode_steps
-from e2efly.vehicles import load_family
-from e2efly.vehicles.family import DRAWN
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.family import DRAWN, load_family
+from e2efly.vehicles.gravity import GRAVITY
 
 NEEDS = "foundation-policy==1.0.2", "numpy"
 SEED, BATCH = 7, 250

@@ -19,7 +19,7 @@ from common import arguments, table, write
 
 from e2efly.simulation.device import prepare
 from e2efly.simulation.physics import Physics, State, step
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 FLIGHT_S, HELD_S, FINE_S = 2.0, 0.2, 0.00025
 """Duration of a flight, of a command, and of a step of the independent plant, s."""

@@ -32,7 +32,8 @@ from e2efly.logs.csv_file import column_map
 from e2efly.logs.readers import Reading, read_part
 from e2efly.logs.recording import Record, Stream
 from e2efly.simulation.device import prepare
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 PARTS = ("log15:15.8-50.8", "log10:8.7-38.7")
 COLUMNS = (

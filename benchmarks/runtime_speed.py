@@ -47,7 +47,7 @@ def flight(path: str, acts: int) -> dict[str, float]:
     from e2efly.policy.odometry import Odometry
     from e2efly.policy.runtime import Runtime, act, begin
     from e2efly.tasks.route import course_for
-    from e2efly.vehicles import load_vehicle
+    from e2efly.vehicles.loading import load_vehicle
 
     imported = time.perf_counter()
     policy = load_policy(path)

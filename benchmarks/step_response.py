@@ -31,8 +31,9 @@ from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
 from e2efly.validation.steps import HOLD_S, Step, fly_steps
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.viewing.alignment import AFTER, ASKED, BEFORE, MEASURED, both
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
+from e2efly.viewing.alignment_plots import AFTER, ASKED, BEFORE, MEASURED, both
 from e2efly.viewing.style import figure
 
 PICTURE = Path(__file__).parents[1] / "docs" / "step_response.png"

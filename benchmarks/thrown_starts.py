@@ -21,8 +21,8 @@ import numpy as np  # noqa: E402
 from e2efly.environment import Env, random_key  # noqa: E402
 from e2efly.runs import presets  # noqa: E402
 from e2efly.simulation.physics.rotation import rotate  # noqa: E402
-from e2efly.vehicles import load_vehicle  # noqa: E402
-from e2efly.vehicles.vehicle import GRAVITY  # noqa: E402
+from e2efly.vehicles.gravity import GRAVITY  # noqa: E402
+from e2efly.vehicles.loading import load_vehicle  # noqa: E402
 
 STARTS = 100_000
 

@@ -27,7 +27,8 @@ from e2efly.alignment.vehicle_file import write_vehicle
 from e2efly.logs.csv_file import write_csv
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 FLIGHTS = 100
 """Of each policy on its body."""

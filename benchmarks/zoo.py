@@ -51,7 +51,8 @@ from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory, to_json
 from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import candidate
-from e2efly.vehicles import family_names, vehicle_names
+from e2efly.vehicles.family import family_names
+from e2efly.vehicles.loading import vehicle_names
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""

@@ -21,7 +21,7 @@ from e2efly.environment.stress_rows import ROWS, rows_for
 from e2efly.policy.zoo import contents
 from e2efly.tasks import TASKS
 from e2efly.validation.stress import stress
-from e2efly.vehicles import vehicle_names
+from e2efly.vehicles.loading import vehicle_names
 
 
 def _by_criterion(columns: Iterable[str], called: str, of: Callable[[Any], dict[str, float]], scale: float) -> Any:

@@ -258,7 +258,7 @@ def families() -> None:
     """docs/any_vehicle.png: what the ranges of `any` draw."""
     from PIL import Image
 
-    from e2efly.vehicles import load_family
+    from e2efly.vehicles.family import load_family
     from e2efly.viewing.family_plot import plot_family
 
     family, path = load_family("any"), DOCS / "any_vehicle.png"

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from e2efly.simulation.physics import Physics, State, step
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 vehicle = load_vehicle("vis_r")
 physics = Physics.of(vehicle, command_mode="position")

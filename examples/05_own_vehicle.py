@@ -4,7 +4,7 @@ import tempfile
 from importlib import resources
 from pathlib import Path
 
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 text = (resources.files("e2efly.vehicles") / "vis_r.toml").read_text()
 with tempfile.TemporaryDirectory() as folder:

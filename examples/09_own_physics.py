@@ -10,7 +10,7 @@ import numpy as np
 
 import e2efly
 from e2efly.policy.loader import Policy
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 LARGEST_STEP = 0.005
 GRAVITY = np.array([0.0, 0.0, -9.81])

@@ -35,7 +35,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
-from e2efly.vehicles import Vehicle, load_vehicle  # noqa: E402
+from e2efly.vehicles.loading import load_vehicle  # noqa: E402
+from e2efly.vehicles.vehicle import Vehicle  # noqa: E402
 
 settings.register_profile("suite", deadline=None)  # how busy the machine is says nothing of the code
 settings.load_profile("suite")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from e2efly.validation.plant import Plant, RigidState
     from e2efly.validation.plant_validation import validate
     from e2efly.validation.plants import register as register_plant
-    from e2efly.vehicles import load_vehicle
+    from e2efly.vehicles.loading import load_vehicle
 
 __all__ = [
     "Plant",
@@ -66,7 +66,7 @@ _FACE = {
     "Plant": "e2efly.validation.plant", "RigidState": "e2efly.validation.plant",
     "evaluate": "e2efly.validation.evaluation",
     "export": "e2efly.adapters.export_policy",
-    "list_tasks": "e2efly.api", "load_policy": "e2efly.policy.loader", "load_vehicle": "e2efly.vehicles",
+    "list_tasks": "e2efly.api", "load_policy": "e2efly.policy.loader", "load_vehicle": "e2efly.vehicles.loading",
     "make_env": "e2efly.api", "preset": "e2efly.api", "register_algorithm": "e2efly.config.algorithms:register",
     "register_plant": "e2efly.validation.plants:register",
     "register_reward": "e2efly.simulation.rewards:register", "register_task": "e2efly.tasks:register",

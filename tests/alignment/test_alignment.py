@@ -20,8 +20,8 @@ from e2efly.logs.recording import Record, Stream
 from e2efly.logs.telemetry import Telemetry
 from e2efly.validation.plant_excitation import PERFECT, Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import read_sigmas
+from e2efly.vehicles.loading import load_vehicle, read_sigmas
+from e2efly.vehicles.vehicle import Vehicle
 
 FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(FILE, rate_gain=FILE.rate_gain * [1.3, 0.75, 1.2], latency=0.035)

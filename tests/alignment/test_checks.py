@@ -9,7 +9,8 @@ import pytest
 
 from e2efly.alignment.checks import checked
 from e2efly.logs.recording import Record, Stream
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from e2efly.alignment.model import Model
 from e2efly.alignment.windows import cut
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 FILE = load_vehicle("vis_r")
 FAR = dataclasses.replace(

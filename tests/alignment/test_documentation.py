@@ -18,7 +18,8 @@ from e2efly.logs.recording import Record
 from e2efly.logs.telemetry import Telemetry
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from tests.alignment.test_stand import write
 
 PAGE = Path(__file__).parents[2] / "docs" / "identification.md"

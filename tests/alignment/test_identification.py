@@ -14,7 +14,8 @@ from e2efly.logs.csv_file import write_csv
 from e2efly.logs.recording import Record
 from e2efly.validation.plant_excitation import PERFECT, Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(
@@ -205,7 +206,7 @@ def test_the_command_writes_a_vehicle_that_loads_and_says_what_it_did(
 ) -> None:
     monkeypatch.setattr("e2efly.viewing.style.DPI", 30)
     from e2efly.commands.cli import run
-    from e2efly.vehicles.vehicle import read_sigmas
+    from e2efly.vehicles.loading import read_sigmas
 
     write_csv(record, tmp_path / "log.csv")
     out = tmp_path / "mine"

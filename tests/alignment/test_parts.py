@@ -7,8 +7,7 @@ import pytest
 import trimesh
 
 from e2efly.alignment.parts import estimates, prototype, read_parts
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import _HERE
+from e2efly.vehicles.loading import _HERE, load_vehicle
 
 
 def parts(tmp_path: Path, text: str) -> Path:

@@ -13,7 +13,7 @@ import e2efly
 from e2efly.commands.cli import COMMANDS, run
 from e2efly.commands.train import parse
 from e2efly.learning.judge import verdict
-from e2efly.vehicles import vehicle_file
+from e2efly.vehicles.loading import vehicle_file
 from tests.learning.one_program import compile_once
 
 pytestmark = pytest.mark.usefixtures("quick")

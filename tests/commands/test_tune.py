@@ -13,7 +13,7 @@ from e2efly.logs.csv_file import write_csv
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
 from e2efly.validation.stress import stress
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 
 

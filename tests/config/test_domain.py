@@ -27,7 +27,7 @@ from e2efly.tasks.route import ANYWAY, UNDECLARED, course_for, goal_notes, route
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.splines import polynomial
 from e2efly.validation.evaluation import candidate
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 

@@ -11,7 +11,7 @@ from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
 from e2efly.simulation.physics import Physics, State
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.state import Parts
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 RNG = np.random.default_rng(3)

@@ -12,8 +12,8 @@ from e2efly.config import DisturbanceConfig, EnvConfig, RewardConfig
 from e2efly.environment import Env, EnvState, random_key
 from e2efly.environment.disturbance import Disturbance, advance, draw
 from e2efly.tasks.hover import HoverConfig
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from tests.gradients import central, reverse
 
 STILL = HoverConfig(position=0.0, velocity=0.0, tilt=0.0, body_rate=0.0)

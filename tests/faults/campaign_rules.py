@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 from tests.faults.injection import Excuse, Rule
 from tests.faults.stage import Trace
 

@@ -12,7 +12,7 @@ from e2efly.flight.pilot.flight_state import Mode
 from e2efly.policy.odometry import yaw_of
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.command_streams import Loopback, encode
 
 VEHICLE = load_vehicle("vis_r")

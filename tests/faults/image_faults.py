@@ -27,7 +27,7 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.camera_process import FRAME
 
 LATE_S = 0.15

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.flight.sight.image_source import Frame
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.injection import Flier, Injection, Kind, Parameters, one_of, uniform, vector
 from tests.faults.stage import FENCE, TARGET, Stage
 

@@ -10,7 +10,7 @@ import numpy as np
 from e2efly.flight.sight.image_source import Frame
 from e2efly.policy.odometry import Sample
 from e2efly.validation.sitl import FirmwareState
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 Parameters = dict[str, Any]
 

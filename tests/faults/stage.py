@@ -23,7 +23,8 @@ from e2efly.policy.loader import Policy
 from e2efly.policy.odometry import tilt_of
 from e2efly.validation.bridge_session import Session, run
 from e2efly.validation.rig import Rig
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.faulty import FaultyImages, FaultyLink, FaultyNetwork, FaultyPoses
 from tests.faults.virtual_watchdog import VirtualWatchdog
 from tests.flight.command_streams import Loopback, encode

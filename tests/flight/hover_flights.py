@@ -8,8 +8,8 @@ import numpy as np
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.control.place import ZERO, Place
 from e2efly.flight.pilot.hovering import HoverController, Seen, UnderWay, sent
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 STEP = 0.005
 """Of the bodies, s."""

@@ -17,7 +17,7 @@ from e2efly.flight.betaflight.controller import identify
 from e2efly.flight.betaflight.link import Link, open_link
 from e2efly.validation import binary
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 RELEASES = Path(__file__).parents[1] / "data" / "msp_releases.json"
 

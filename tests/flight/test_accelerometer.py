@@ -7,7 +7,7 @@ import pytest
 
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.accelerometer import RANGE, Scale, learn, level, standing_problem
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 DT = 0.02
 

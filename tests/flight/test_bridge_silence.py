@@ -15,8 +15,8 @@ from e2efly.flight.pilot.flight_state import Flight, Mission, Mode, Pilot, Targe
 from e2efly.flight.pilot.throttle_map import ThrottleHistory
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Sample
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_msp_client import Wire, controller, recorded
 from tests.flight.test_pose_tracking import sample
 

@@ -22,8 +22,8 @@ from e2efly.flight.commander.stream import STEADY_S, Stream, take
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import MODES, Envelope
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.command_streams import Loopback, encode
 from tests.flight.test_msp_client import controller, recorded
 

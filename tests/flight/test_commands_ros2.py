@@ -11,7 +11,7 @@ from e2efly.flight.commander.commander import Commander
 from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.command_streams import PUBLISHED, REFUSED, TOPICS, first, refused
 from tests.flight.ros_domain import publisher, ros_domain
 

@@ -14,8 +14,8 @@ from e2efly.flight.pilot.hover import LIFTED, rates_of
 from e2efly.flight.pilot.hovering import Seen, UnderWay, hover_controller
 from e2efly.flight.pose.conditions import Checks
 from e2efly.policy.odometry import Odometry, Sample
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_pose_tracking import LEVEL, T, sample
 
 HOVER, GROUND = Flight(Mode.HOVER), Flight()

@@ -25,8 +25,9 @@ from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Runtime, act, begin
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 FILE = load_vehicle("vis_r")
 SETTINGS = FlightSettings()

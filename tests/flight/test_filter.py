@@ -21,8 +21,8 @@ from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.simulation.scenes.file import load_scene
 from e2efly.simulation.scenes.scene import clearance
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 FENCE = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 6.0), speed=6.0, tilt=1.4)

@@ -9,7 +9,7 @@ from e2efly.flight.flight_loop import fly, plan_of
 from e2efly.flight.pilot.flight_state import Flight, Mode
 from e2efly.flight.pilot.inertial import Inertial
 from e2efly.flight.pilot.throttle_map import ThrottleMap
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_sticks import STICKS
 
 

@@ -10,7 +10,7 @@ import pytest
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.heading_watch import HeadingWatch, watched
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 RATE = 100.0
 Push = Callable[[float, complex, complex], complex]

@@ -23,8 +23,9 @@ from e2efly.flight.pilot.hover import (
     sink_time,
 )
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle
 
 VEHICLE = load_vehicle("vis_r")
 

@@ -26,8 +26,8 @@ from e2efly.flight.pilot.hovering import (
     thrust_of,
 )
 from e2efly.flight.pilot.hovering.loops import LIMIT, grown
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.hover_flights import Case, Flights, fly
 from tests.flight.test_sticks import recorded
 

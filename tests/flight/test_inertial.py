@@ -11,7 +11,7 @@ from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.inertial import BURIED, Inertial, Measurement, alone, carry, measure, see
 from e2efly.flight.pilot.touch import LAGS
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 DT = 0.02
 """Between two measurements, s."""

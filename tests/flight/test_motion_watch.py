@@ -10,7 +10,7 @@ from e2efly.control.vectors import Quat
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.motion_watch import MotionWatch, feel, see
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 RATE = 50.0
 Lie = Callable[[Odometry], Odometry]

@@ -22,7 +22,7 @@ from e2efly.flight.pilot.reckoning import (
     trimmed,
 )
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 DT, STILL = 0.02, (0.0, 0.0, 0.0)
 """Between two measurements, s; a body rate, rad/s."""

@@ -28,7 +28,7 @@ from e2efly.flight.settings import FlightSettings
 from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Sample
 from e2efly.policy.zoo import policy_file
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 REPLIES: dict[str, dict[str, str]] = json.loads(
     (Path(__file__).parents[1] / "data" / "msp_releases.json").read_text(encoding="utf-8")

@@ -19,7 +19,7 @@ from e2efly.flight.pilot.landing import BEYOND_S, FAST, FOUND_S, SLOWED_S, has_s
 from e2efly.flight.pilot.state_machine import AHEAD, FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 SETTINGS = FlightSettings()
 DT = 0.01

@@ -18,7 +18,7 @@ from e2efly.flight.betaflight.settings_messages import RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, angle_range
 from e2efly.flight.betaflight.switches import switch_rows
 from e2efly.flight.settings import FlightSettings
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_settings_check import NEWEST, recorded
 
 GUIDED = recorded(NEWEST)

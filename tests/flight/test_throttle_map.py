@@ -23,8 +23,8 @@ from e2efly.flight.pilot.throttle_map import (
     learn,
     update,
 )
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 NEW = ThrottleMap.of(VEHICLE)

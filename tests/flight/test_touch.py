@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from e2efly.flight.pilot.touch import AGAIN_S, LAGS, LONGEST_S, LOW, STILL, UNTOLD_S, Touch, feel, seen, wave
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 DT = 0.02
 """Between two measurements, s."""

@@ -22,8 +22,9 @@ from e2efly.simulation import device
 from e2efly.simulation.physics import Physics, step
 from e2efly.validation.evaluation import act_of
 from e2efly.validation.stress import stress
-from e2efly.vehicles import Vehicle, load_family, load_vehicle, vehicle_file
-from e2efly.vehicles.family import Family, _loaded
+from e2efly.vehicles.family import Family, _loaded, load_family
+from e2efly.vehicles.loading import load_vehicle, vehicle_file
+from e2efly.vehicles.vehicle import Vehicle
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -20,7 +20,7 @@ from e2efly.policy.observation import ATTITUDE, BODY_RATE, VELOCITY, Field, past
 from e2efly.policy.random_inputs import random_observations
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_vehicle, vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 GOALS = Field("goals", 6, "world", "m", 3.0, "two positions minus vehicle position")
 

@@ -22,7 +22,7 @@ from e2efly.policy.random_inputs import random_images, random_observations
 from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory, run_of
 from e2efly.validation.evaluation import act_of, check_observation, config_from_contract
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 DEPTH = CameraConfig("depth", width=16, height=12, reach=(0.3, 8.0), rate=15.0, latency=(0.0, 0.05))
 MASK, RGB = CameraConfig("mask", width=16, height=16), CameraConfig("rgb", width=8, height=8)

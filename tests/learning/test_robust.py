@@ -16,7 +16,7 @@ from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.simulation.sensors.eyes import steady
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_vehicle, vehicle_file
+from e2efly.vehicles.loading import load_vehicle, vehicle_file
 
 ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module__.startswith("e2efly.")]
 

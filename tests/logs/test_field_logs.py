@@ -17,7 +17,7 @@ from e2efly.logs.csv_file import column_map, read_csv
 from e2efly.logs.readers import FORMATS, Reading, read_flights
 from e2efly.logs.recording import Record, Stream, percent
 from e2efly.logs.ros_bag import _store_of
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.logs.log_samples import IMU, SAMPLES, bag, crazyflie, odometry, only, two_events, ulog
 
 POSE = odometry()["pose"]["pose"]

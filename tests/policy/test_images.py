@@ -22,7 +22,7 @@ from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Runtime, act, begin
 from e2efly.runs import presets
 from e2efly.tasks.route import course_for
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.policy.test_contract import EXAMPLE
 
 VEHICLE = load_vehicle("vis_r")

@@ -26,7 +26,7 @@ from e2efly.policy.onnx_file import sealed
 from e2efly.policy.random_inputs import random_observations
 from e2efly.policy.zoo import policy_file
 from e2efly.runs import presets
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 Change = Callable[[onnx.ModelProto], None]
 

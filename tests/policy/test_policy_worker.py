@@ -27,7 +27,7 @@ from e2efly.policy.runtime import Runtime
 from e2efly.policy.worker import PolicyWorker
 from e2efly.runs import presets
 from e2efly.tasks.route import course_for
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.waiting import until
 
 VEHICLE = load_vehicle("vis_r")

@@ -31,7 +31,7 @@ from e2efly.tasks import TASKS
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import Route, course_for, fields_of
 from e2efly.tasks.track.goal import TrackRoute
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 START = 5000.0
@@ -371,7 +371,7 @@ from e2efly.tasks.route import course_for
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.loader import load_policy
 from e2efly.policy.runtime import Runtime, act, begin
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 policy, vehicle = load_policy({str(hovering)!r}), load_vehicle("vis_r")
 runtime = Runtime.of(policy, course_for(policy.contract, vehicle), vehicle)
 still = Odometry(0.0, np.ones(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))

@@ -22,7 +22,8 @@ from e2efly.simulation.device import wide_vectors
 from e2efly.tasks import TASKS
 from e2efly.validation import evaluation
 from e2efly.validation.stress import stress
-from e2efly.vehicles import family_names, vehicle_file, vehicle_names
+from e2efly.vehicles.family import family_names
+from e2efly.vehicles.loading import vehicle_file, vehicle_names
 from tests.conftest import QUICK, NetworkTrace
 
 USUALLY = {"xla_backend_optimization_level": 3}

@@ -14,7 +14,7 @@ from e2efly.config.storage import held
 from e2efly.environment.episodes import summary
 from e2efly.runs.inputs import input_files
 from e2efly.runs.rundir import RunDirectory
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.learning.test_runner import flown, small
 
 PACKAGE = Path(str(resources.files("e2efly")))

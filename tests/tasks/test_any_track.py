@@ -31,7 +31,7 @@ from e2efly.tasks.route import course_for, fields_of
 from e2efly.tasks.task import at_rest, make_task
 from e2efly.validation import evaluation
 from e2efly.validation.starts import draw_starts
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 SHAPE = Shape(0.05, 0.12)
 ANY = presets.preset("race", "bptt", "any_track")

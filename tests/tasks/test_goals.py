@@ -31,7 +31,7 @@ from e2efly.tasks.route import course_for, goal_of, route_of
 from e2efly.tasks.task import at_rest
 from e2efly.tasks.track.goal import TrackRoute
 from e2efly.validation.starts import course_of
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 PERIOD = 0.02

@@ -25,8 +25,8 @@ import numpy as np
 from e2efly.validation.airsim.protocol import DIALECTS, METHODS
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import allocation_matrix
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
 from tests.validation.airsim_eyes import AirSimError, Eyes, quaternion_of
 
 PERIOD = 0.003

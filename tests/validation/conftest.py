@@ -17,7 +17,7 @@ from e2efly.learning.networks import Actor, Features, Layers, Weights
 from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.runs import presets
 from e2efly.validation.plants import PLANTS
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 POSITION, VELOCITY, ATTITUDE = 2.0, 2.4, 6.0
 """Gains: 1/s^2, 1/s, 1/s."""

@@ -14,7 +14,7 @@ from e2efly.flight.pilot.flight_state import Mode
 from e2efly.validation import firmware_program, rig
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 LOW = 0.15

@@ -23,8 +23,8 @@ from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 from tests.validation.airsim_client import Tap, published
 from tests.validation.airsim_server import FLIP, PERIOD, TURN, Server, World, settings
 from tests.waiting import free_port

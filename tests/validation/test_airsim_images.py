@@ -31,8 +31,8 @@ from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.reality import Reality
 from e2efly.validation.starts import draw_starts
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 from tests.validation.airsim_client import Tap, packed, published
 from tests.validation.airsim_eyes import PAD, PALETTE
 from tests.validation.airsim_server import Server, World

@@ -16,7 +16,7 @@ from e2efly.tasks.track.goal import TrackGoal
 from e2efly.validation.baseline import Baseline
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.stress import stress
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 NAMES = "pid", "geometric", "indi", "mpc"
 STILL = {"randomize": {}, "action_latency": (0.06, 0.06)}

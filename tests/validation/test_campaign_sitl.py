@@ -12,7 +12,7 @@ from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.faults.campaign import Scenario, fly
 from tests.faults.injections import COUNTS, KINDS, Faults, Strike
 from tests.faults.scenarios import CASES

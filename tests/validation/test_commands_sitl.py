@@ -11,7 +11,7 @@ from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 from tests.faults.commanders import FAULTS, HOME, STEP, TIMEOUT, VEHICLE, Field, at
 from tests.flight.command_streams import Loopback
 

@@ -19,7 +19,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.firmware_excitation import fly_excited
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(FILE, mass=0.85, inertia=FILE.inertia * 1.2, motor_time_constant=0.045, latency=0.05)

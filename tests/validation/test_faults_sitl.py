@@ -11,7 +11,7 @@ from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.faults import process_faults
 from tests.faults.fault_run import Outcome, strike
 from tests.faults.faults import FAULTS, Fault

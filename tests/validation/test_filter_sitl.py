@@ -17,7 +17,7 @@ from e2efly.logs.telemetry import Telemetry
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 from tests.faults.commanders import VEHICLE, Commands, Field, at
 from tests.flight.command_streams import Loopback
 

@@ -18,8 +18,8 @@ from e2efly.validation.plant import EVERYTHING
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.plants import PLANTS
 from e2efly.validation.reality import altered
-from e2efly.vehicles import Flown, load_vehicle, vehicle_file
-from e2efly.vehicles.vehicle import CONTROLLED
+from e2efly.vehicles.loading import load_vehicle, vehicle_file
+from e2efly.vehicles.vehicle import CONTROLLED, Flown
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"
 CLOSE = {"simulator": 1e-3, "mujoco": 5e-3}

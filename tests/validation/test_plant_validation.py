@@ -11,7 +11,8 @@ from e2efly.commands.policies import Asked
 from e2efly.commands.validate import Validate, run
 from e2efly.config import ImuConfig
 from e2efly.validation.plant_validation import validate
-from e2efly.vehicles import load_vehicle, vehicle
+from e2efly.vehicles import vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 @pytest.mark.whole

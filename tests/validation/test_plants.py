@@ -19,8 +19,9 @@ from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.mujoco import MujocoPlant, vehicle_xml
 from e2efly.validation.plants.simulator import SimulatorPlant
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HOVER = np.array([GRAVITY, 0.0, 0.0, 0.0])

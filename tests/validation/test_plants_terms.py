@@ -11,8 +11,9 @@ import pytest
 from e2efly.simulation.physics import Physics, State, started
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from tests.validation.test_plants import fine
 
 TERMS: dict[str, dict[str, Any]] = {

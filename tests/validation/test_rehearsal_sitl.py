@@ -10,7 +10,7 @@ from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import load_policy
 from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import rehearse
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 
 @pytest.mark.whole

@@ -16,7 +16,7 @@ from e2efly.flight.betaflight.sticks import Sticks, sticks_of
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.validation.world import Body
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 ARM, ANGLE = 0, 1

@@ -19,7 +19,7 @@ from e2efly.validation.plant_sight import Sight, Watch
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.starts import Starts, draw_starts
 from e2efly.validation.stress import draws
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 STEPS = 12
 

@@ -14,7 +14,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.rehearsal import rehearse
 from e2efly.validation.scenery import Scenery
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.faults.image_faults import FAULTS, UPSIDE_DOWN, fly_with
 
 VEHICLE = load_vehicle("vis_r")

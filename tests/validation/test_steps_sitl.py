@@ -11,7 +11,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import Rig
 from e2efly.validation.steps import SIZES, fly_steps
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
 

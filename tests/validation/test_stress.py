@@ -18,7 +18,7 @@ from e2efly.simulation.scenes.camera import mount
 from e2efly.simulation.sensors.eyes import Eye
 from e2efly.tasks import TASKS
 from e2efly.validation.stress import stress
-from e2efly.vehicles import load_vehicle, vehicle_file
+from e2efly.vehicles.loading import load_vehicle, vehicle_file
 
 VIS_R = load_vehicle("vis_r")
 N = 4000

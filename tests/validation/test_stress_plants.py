@@ -15,7 +15,7 @@ from e2efly.validation.plant_stress import lacking, realities, stress
 from e2efly.validation.plants import PLANTS, find_plant
 from e2efly.validation.stress import Report, draws
 from e2efly.validation.stress import stress as in_training
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"
 DRAWN_ALIKE = (

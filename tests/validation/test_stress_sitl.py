@@ -9,7 +9,7 @@ import pytest
 import e2efly
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.stress import stress as in_training
-from e2efly.vehicles import vehicle_file
+from e2efly.vehicles.loading import vehicle_file
 
 ROWS = ("nominal", "mass x1.25", "thrust falls by 15 %", "wind 3 m/s", "delay +20 ms", "motor lag x2")
 CLOSE = 0.12

@@ -22,7 +22,7 @@ from e2efly.validation.plant_flight import Trajectory, fly
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.validation.starts import BATCH, Starts, draw_starts
 from e2efly.validation.task_verdict import judge
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 N = 4
 SEED = 1_000_000

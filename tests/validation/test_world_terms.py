@@ -10,7 +10,7 @@ import pytest
 
 from e2efly.simulation.physics import Physics, State, step
 from e2efly.validation.world import Body, World
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 TERMS: dict[str, Any] = {
     "rotor_inertia": 1.5e-5,

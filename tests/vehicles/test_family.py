@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.vehicles import family_names, load_family, load_vehicle, nominal_vehicle, vehicle_file, vehicle_names
-from e2efly.vehicles.family import DRAWN, Family, measured
-from e2efly.vehicles.vehicle import check, quantities
+from e2efly.vehicles.family import DRAWN, Family, family_names, load_family, measured, nominal_vehicle
+from e2efly.vehicles.loading import load_vehicle, vehicle_file, vehicle_names
+from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.vehicle_rules import check
 
 
 def family() -> Family:

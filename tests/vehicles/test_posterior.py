@@ -15,7 +15,7 @@ from e2efly.commands.cli import run
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
 from e2efly.environment.environment import Env
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import WIDEST, load_posterior
 
 BASE = load_vehicle("vis_r")

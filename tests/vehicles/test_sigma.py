@@ -7,8 +7,7 @@ import pytest
 
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.vehicle_file import write_vehicle
-from e2efly.vehicles import load_vehicle, vehicle_file
-from e2efly.vehicles.vehicle import read_sigmas
+from e2efly.vehicles.loading import load_vehicle, read_sigmas, vehicle_file
 
 FILE = load_vehicle("vis_r")
 

@@ -13,9 +13,9 @@ import pytest
 from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, EnvState, random_key
 from e2efly.runs.presets import preset
-from e2efly.vehicles import load_vehicle, vehicle_file, vehicle_names
-from e2efly.vehicles.terms import BATTERY
-from e2efly.vehicles.vehicle import quantities, read_sigmas, terms
+from e2efly.vehicles.loading import load_vehicle, read_sigmas, vehicle_file, vehicle_names
+from e2efly.vehicles.vehicle import quantities, terms
+from e2efly.vehicles.vehicle_rules import BATTERY
 from tests.terms import VALUES
 
 

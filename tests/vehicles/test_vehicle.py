@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import e2efly.vehicles.vehicle as module
-from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, quantities
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, quantities
 
 SHIPPED = ("crazyflie", "vis_h", "vis_r")
 

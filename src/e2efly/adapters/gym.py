@@ -42,7 +42,7 @@ def observation_space(stepper: Stepper) -> Space[Any]:
 
 
 def action_space() -> Box:
-    """The four commands of a policy, each in [-1, 1] (docs/architecture.md)."""
+    """The four commands of a policy, each in [-1, 1] (docs/decisions.md)."""
     return Box(-1.0, 1.0, (4,), np.float32)
 
 

@@ -14,8 +14,8 @@ from e2efly.alignment.model import Model
 from e2efly.alignment.replay import Stretches, replay, rms, stretches, thrust_is_told, wrong
 from e2efly.alignment.windows import REACH, STEP
 from e2efly.logs.recording import Record
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 EARLY_S = 0.025
 """Time by which a response may seem to come before its command, s. This happens when the vehicle is quicker than the

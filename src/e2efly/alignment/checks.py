@@ -13,8 +13,8 @@ from scipy.signal import lfilter
 from e2efly.control import Quat, Vec3
 from e2efly.logs.blackbox import vertex
 from e2efly.logs.recording import KINDS, Record, Stream, percent
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 LIMITS = {
     "position": 1e4, "velocity": 100.0, "quaternion": 1.01, "body_rate": 60.0, "specific_force": 300.0,

@@ -14,7 +14,7 @@ class Estimate:
     """The estimate of a parameter from one source."""
 
     name: str
-    """A field of `e2efly.vehicles.Vehicle`."""
+    """A field of `e2efly.vehicles.vehicle.Vehicle`."""
     value: np.ndarray
     """Value, in the shape and unit of the field. NaN in entries for which the source has no value."""
     sigma: np.ndarray

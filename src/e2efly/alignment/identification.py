@@ -14,7 +14,7 @@ from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import MOTORS, Record
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 SHOWN = 0.5
 """If the standard deviation is above this fraction of the prior's, the flights say nothing about an unknown."""

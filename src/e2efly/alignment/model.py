@@ -18,7 +18,7 @@ from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import INTEGRATORS
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, State, split4
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from e2efly.alignment.estimates import Estimate
 from e2efly.config.tables import number, read_table, shown
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 AXES = ("x", "y", "z")
 SPREAD = 0.01

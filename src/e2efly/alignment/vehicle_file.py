@@ -9,9 +9,10 @@ import numpy as np
 from e2efly.alignment.estimates import Estimate
 from e2efly.config.storage import write_atomically
 from e2efly.config.tables import read_table
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.loading import CORRELATION, vehicle_file
 from e2efly.vehicles.posterior import Entry, read_correlation
-from e2efly.vehicles.vehicle import CORRELATION, check, quantities, vehicle_file
+from e2efly.vehicles.vehicle import Vehicle, quantities
+from e2efly.vehicles.vehicle_rules import check
 
 
 def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:

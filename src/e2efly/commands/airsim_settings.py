@@ -34,7 +34,7 @@ def run(options: AirsimSettings) -> int:
     from e2efly.policy.loader import load_policy
     from e2efly.policy.zoo import policy_file
     from e2efly.validation.airsim.settings_file import named, settings, unsaid
-    from e2efly.vehicles import load_vehicle
+    from e2efly.vehicles.loading import load_vehicle
 
     if not 1 <= options.port <= 65535:
         raise ValueError(f"--port is {options.port}; accepted: 1 to 65535")

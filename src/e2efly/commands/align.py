@@ -12,7 +12,8 @@ from rich.table import Table
 from e2efly.commands.log_options import LogOptions, show_notes
 from e2efly.commands.terminal import Terminal
 from e2efly.config.storage import write_json
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from e2efly.alignment.alignment import Alignment
@@ -55,7 +56,7 @@ def run(options: Align) -> int:
     from e2efly.alignment.vehicle_file import write_vehicle
     from e2efly.logs.readers import read_flights
     from e2efly.simulation.device import prepare
-    from e2efly.viewing.alignment import plot_alignment
+    from e2efly.viewing.alignment_plots import plot_alignment
 
     began, console = time.perf_counter(), Terminal()
     if not options.logs:

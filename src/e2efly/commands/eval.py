@@ -18,7 +18,7 @@ from e2efly.config import EnvConfig, TaskConfig
 from e2efly.config.run import TIMED
 from e2efly.config.storage import write_json
 from e2efly.policy.zoo import beside
-from e2efly.vehicles import Controller
+from e2efly.vehicles.vehicle import Controller
 
 if TYPE_CHECKING:
     from e2efly.validation.evaluation import Candidate, Evaluation

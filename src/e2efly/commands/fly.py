@@ -47,7 +47,8 @@ from e2efly.policy.worker import PolicyWorker
 from e2efly.policy.zoo import policy_file
 from e2efly.runs.rundir import run_of
 from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 CONNECT_S = 5.0
 """How long the controller may take to send its first answer, s."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 from rich.text import Text
 
+from e2efly.commands.hil_options import Hil
 from e2efly.commands.terminal import Terminal
 from e2efly.config.budget import check_time
 from e2efly.config.storage import held, write_json
@@ -17,7 +18,6 @@ from e2efly.courses.origin import Origin
 from e2efly.flight.process import raise_at_interrupt
 
 if TYPE_CHECKING:
-    from e2efly.commands.hil import Hil
     from e2efly.validation.hil_lap import Lap, Spread
 
 LAP_S = 30.0
@@ -37,7 +37,7 @@ REHEARSALS, OWN = (
 """Options for rehearsals only, and options that a rehearsal sets itself."""
 
 
-def check_rehearsal(o: "Hil") -> None:
+def check_rehearsal(o: Hil) -> None:
     """Refuse options that have no effect, and numbers out of range.
 
     Raises:
@@ -56,7 +56,7 @@ def check_rehearsal(o: "Hil") -> None:
     check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
 
 
-def rehearse(o: "Hil", task: dict[str, Any], origin: Origin) -> int:
+def rehearse(o: Hil, task: dict[str, Any], origin: Origin) -> int:
     """Fly, print a table, and write a report and pictures.
 
     Args:

@@ -13,9 +13,11 @@ from rich.table import Table
 
 from e2efly.commands.log_options import LogOptions, show_notes
 from e2efly.commands.terminal import Terminal
+from e2efly.config.names import unknown
 from e2efly.config.storage import held, write_json
-from e2efly.vehicles import Vehicle, load_vehicle, unknown
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
+from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate

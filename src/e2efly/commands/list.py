@@ -15,7 +15,8 @@ from e2efly.policy import zoo
 from e2efly.runs import presets
 from e2efly.simulation.device import prepare
 from e2efly.tasks import TASKS
-from e2efly.vehicles import family_names, load_family, load_vehicle, vehicle_names
+from e2efly.vehicles.family import family_names, load_family
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 Rows = list[dict[str, Any]]
 

@@ -12,7 +12,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import Candidate
 from e2efly.validation.rehearsal import Rehearsal, rehearse
 from e2efly.validation.scenery import Scenery
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 
 def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, seed: int = 0) -> list[Rehearsal]:

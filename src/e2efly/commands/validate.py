@@ -19,7 +19,7 @@ from e2efly.config import TaskConfig
 from e2efly.config.budget import check_time
 from e2efly.config.storage import write_atomically, write_json
 from e2efly.policy.zoo import beside
-from e2efly.vehicles import Controller
+from e2efly.vehicles.vehicle import Controller
 
 if TYPE_CHECKING:
     from e2efly.validation.evaluation import Candidate
@@ -196,7 +196,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
     complete.
     """
     from e2efly.commands.rehearsals import flights_table, fly_whole
-    from e2efly.vehicles import load_vehicle
+    from e2efly.vehicles.loading import load_vehicle
 
     body, policy = load_vehicle(found.candidate.vehicle), found.candidate.policy
     if not found.plant.whole_flights or not count or policy.contract.refusals(body):

@@ -19,7 +19,7 @@ from e2efly.flight.process import be_idle
 from e2efly.policy.zoo import policy_file
 
 if TYPE_CHECKING:
-    from e2efly.viewing.watch.recording import Recording
+    from e2efly.viewing.watch.recorded import Recording
     from e2efly.viewing.watch.report import Shown
     from e2efly.viewing.watch.simulation import Simulation
     from e2efly.viewing.watch.stage import Source
@@ -188,7 +188,7 @@ def _poses(o: Watch) -> "Iterator[Any]":
     """A vehicle at the poses of a pose source."""
     from e2efly.flight.pose.sources import open_source
     from e2efly.simulation.scenes.faces import bodies
-    from e2efly.vehicles import load_vehicle
+    from e2efly.vehicles.loading import load_vehicle
     from e2efly.viewing.watch.poses import Poses
 
     stands = ()
@@ -235,8 +235,8 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
 
 
 def _recording(o: Watch, logs: list[Path]) -> Any:
-    from e2efly.vehicles import load_vehicle
-    from e2efly.viewing.watch.recording import Recording, read_flight, vehicle_of
+    from e2efly.vehicles.loading import load_vehicle
+    from e2efly.viewing.watch.recorded import Recording, read_flight, vehicle_of
 
     vehicle = load_vehicle(o.vehicle) if o.vehicle else vehicle_of(logs[0]) or load_vehicle(USUAL)
     return Recording([read_flight(path, vehicle) for path in logs], vehicle)
@@ -259,7 +259,7 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
     """The first start of a report in the requested criterion, and all starts."""
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
-    from e2efly.viewing.watch.recording import Recording
+    from e2efly.viewing.watch.recorded import Recording
     from e2efly.viewing.watch.report import read_report
 
     starts, vehicle = read_report(report)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from e2efly.control.vectors import Array, Quat, Vec3, namespace, safe_sqrt
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 Command = tuple[Array, Array, Array, Array]
 

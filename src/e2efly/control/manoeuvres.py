@@ -11,7 +11,8 @@ import numpy as np
 
 from e2efly.control.cascade import Ctbr, Motion, limited, reach
 from e2efly.control.vectors import Vec3
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 DURATION = 30.0
 """Duration of the whole flight, s."""

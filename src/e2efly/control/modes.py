@@ -10,7 +10,8 @@ import numpy as np
 
 from e2efly.control.cascade import Command, Controller, Ctbr, Motion, accelerate, limited, reach, turn
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 Four = tuple[float, float, float, float]
 Limits = tuple[list[float], list[float]]

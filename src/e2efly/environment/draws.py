@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.tasks.task import uniform
-from e2efly.vehicles import Vehicle
 from e2efly.vehicles.posterior import WIDEST, Posterior
+from e2efly.vehicles.vehicle import Vehicle
 
 jax.tree_util.register_dataclass(Posterior, data_fields=["root"], meta_fields=["entries"])
 

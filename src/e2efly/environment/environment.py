@@ -46,9 +46,10 @@ from e2efly.simulation.sensors import imu, latency
 from e2efly.simulation.sensors.eyes import Eye, image_shape, steady
 from e2efly.simulation.sensors.noise import add_noise
 from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
-from e2efly.vehicles import Family, Flown, load_family, load_vehicle
-from e2efly.vehicles.family import DRAWN
+from e2efly.vehicles.family import DRAWN, Family, load_family
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
+from e2efly.vehicles.vehicle import Flown
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """Look-ahead times for which a critic is given the clearance, s."""

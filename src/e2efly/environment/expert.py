@@ -13,8 +13,8 @@ from jaxtyping import Array, Float
 from e2efly.control import Quat, Vec3
 from e2efly.control.cascade import reach
 from e2efly.simulation.physics import State
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 RESERVE = 1.15
 """The expert tilts only so far that its rotors have to carry at most this times its weight."""

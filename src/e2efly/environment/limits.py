@@ -4,8 +4,10 @@ import numpy as np
 
 from e2efly.config import EnvConfig
 from e2efly.control import COMMAND_MODES, command_limits
-from e2efly.vehicles import Family, Vehicle, load_family, load_vehicle
+from e2efly.vehicles.family import Family, load_family
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
+from e2efly.vehicles.vehicle import Vehicle
 
 MOST = 10.0
 """Largest factor on the standard deviations of an identified vehicle from which episodes may draw."""

@@ -5,13 +5,14 @@ import dataclasses
 import numpy as np
 
 from e2efly.config import EnvConfig, TaskConfig, check_fields
+from e2efly.config.names import unknown
 from e2efly.config.numbers import LATEST
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
-from e2efly.vehicles import Vehicle, load_family, nominal_vehicle, unknown
+from e2efly.vehicles.family import load_family, nominal_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior
-from e2efly.vehicles.terms import battery_share
-from e2efly.vehicles.vehicle import principal_moments, quantities, terms
+from e2efly.vehicles.vehicle import Vehicle, principal_moments, quantities, terms
+from e2efly.vehicles.vehicle_rules import battery_share
 
 COUNTED = 2**24
 """Largest number of control steps in an episode: float32 does not count further."""

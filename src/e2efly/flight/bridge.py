@@ -48,7 +48,8 @@ from e2efly.flight.sight.quality import Seen as Watched
 from e2efly.policy.odometry import Odometry, Sample, yaw_of
 from e2efly.policy.runtime import Decision, Imu
 from e2efly.policy.worker import Worker
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
 """Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without

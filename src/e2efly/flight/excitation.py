@@ -21,8 +21,8 @@ from e2efly.flight.settings import FlightSettings
 from e2efly.policy.contract import CONTRACT_VERSION, Action, Contract
 from e2efly.policy.goal import Course, Goal, Observed, Outcome
 from e2efly.policy.observation import ATTITUDE, VELOCITY, Field
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 NAME = "excitation"
 """The name on the command line and in the contract."""

@@ -16,7 +16,7 @@ from e2efly.learning.programs import start_program
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.simulation.physics import Physics, State, step
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import quantities
 
 

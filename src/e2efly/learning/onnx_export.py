@@ -24,7 +24,7 @@ from e2efly.policy.onnx_graph import IR_VERSION, OPSET
 from e2efly.policy.onnx_session import remember
 from e2efly.policy.random_inputs import random_images, random_observations
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_family, nominal_vehicle
+from e2efly.vehicles.family import load_family, nominal_vehicle
 from e2efly.vehicles.vehicle import quantities, terms
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.logs.recording import Record, Streams, listed
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 MAGIC = struct.pack("<BH", 0xBC, 2)
 """First bytes of a file: the format and its version."""

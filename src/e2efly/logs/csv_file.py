@@ -15,7 +15,7 @@ import numpy as np
 
 from e2efly.config.names import unknown
 from e2efly.logs.recording import HUGE, KINDS, Record, Stream, listed
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 TIME = "t"
 """Name of the time column, s."""

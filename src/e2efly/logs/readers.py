@@ -15,7 +15,7 @@ from e2efly.logs.mcap_file import PROFILE
 from e2efly.logs.mcap_records import MAGIC, McapRecords
 from e2efly.logs.recording import KINDS, MOTORS, Record, Stream, Streams, listed, plain
 from e2efly.logs.ros_bag import read_bag
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 if TYPE_CHECKING:
     from e2efly.logs.flight_log import Series

@@ -19,8 +19,9 @@ from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
 from e2efly.policy.observation import Field
-from e2efly.vehicles import Ranges, Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.family import Ranges
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 CONTRACT_VERSION = 2
 """Version of the meaning of these fields; a policy of another version is refused."""

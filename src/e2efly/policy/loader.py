@@ -17,7 +17,8 @@ from e2efly.policy.onnx_file import METADATA, Message, check_seal, file_content,
 from e2efly.policy.onnx_graph import FLOAT, IR_VERSION, OPSET, TYPES, check
 from e2efly.policy.onnx_session import open_session
 from e2efly.policy.zoo import is_shipped, policy_file
-from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle
 
 INPUT, OUTPUT = "observation", "action"
 """Names of the graph's first input and of its output. The inputs for images have the names of the images."""

@@ -17,7 +17,7 @@ from e2efly.policy.contract import ACTION_SIZE, Contract
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, PAST_ACTIONS, VELOCITY, Field
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
 """Command modes that are converted to collective thrust and body rates. A flight controller accepts no rotor

@@ -15,7 +15,7 @@ import numpy as np
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 
 class Worker(Protocol):

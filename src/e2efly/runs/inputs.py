@@ -10,7 +10,7 @@ from typing import Any
 
 from e2efly.config import TrainConfig
 from e2efly.courses.tracks import track_file
-from e2efly.vehicles import vehicle_file
+from e2efly.vehicles.loading import vehicle_file
 
 OWN_FILES = (".toml", ".csv", ".npy")
 """Endings of names that refer to the user's files. Other names refer to files that come with the package."""

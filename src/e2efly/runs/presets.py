@@ -28,7 +28,9 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.policy.zoo import policy_file
 from e2efly.tasks import TASKS
-from e2efly.vehicles import load_family, load_vehicle, posterior
+from e2efly.vehicles import posterior
+from e2efly.vehicles.family import load_family
+from e2efly.vehicles.loading import load_vehicle
 
 ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
 FAMILY = "any"

@@ -27,7 +27,7 @@ XLA_OPTIONS = {
     # see wide_vectors
     "xla_cpu_prefer_vector_width": "128",
 }
-"""Options that make XLA fast on small batches on a CPU. docs/architecture.md gives the reasons."""
+"""Options that make XLA fast on small batches on a CPU. docs/decisions.md gives the reasons."""
 
 
 _USUAL = {

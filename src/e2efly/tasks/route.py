@@ -18,7 +18,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Goal, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.registry import TASKS
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 UNDECLARED = "The policy does not say for which courses it was trained."
 ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"

@@ -18,8 +18,8 @@ from e2efly.policy.loader import Policy
 from e2efly.policy.observation import ATTITUDE, BODY_RATE, VELOCITY
 from e2efly.tasks.registry import TASKS
 from e2efly.tasks.route import goal_of
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,9 @@ from e2efly.simulation.device import prepare
 from e2efly.simulation.physics import State
 from e2efly.tasks.route import UNDECLARED
 from e2efly.validation.baseline import Baseline
-from e2efly.vehicles import Controller, Flown, Vehicle, family_names, load_family, load_vehicle, vehicle_names
+from e2efly.vehicles.family import family_names, load_family
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Controller, Flown, Vehicle
 
 SEED = 1_000_000
 """Default seed of the starts."""

@@ -20,7 +20,7 @@ from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import BLACKBOX, Rig
 from e2efly.validation.sitl import FirmwareState
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.001
 """Interval at which sensors are updated and motors are read, s. The motor outputs react at once to each new gyroscope

@@ -20,7 +20,7 @@ from e2efly.validation.plant import Plant, RigidState
 from e2efly.validation.plant_flight import Trajectory, fly
 from e2efly.validation.plants import find_plant
 from e2efly.validation.reality import Reality, check_realities
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from e2efly.validation.plant_sight import Sight

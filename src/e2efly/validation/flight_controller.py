@@ -10,8 +10,7 @@ import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.validation.plant import Known
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import allocation_matrix, inertia_tensor
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, inertia_tensor
 
 Numbers = Sequence[float]
 

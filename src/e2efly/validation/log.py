@@ -9,7 +9,7 @@ from e2efly.control import Quat, Vec3
 from e2efly.logs.recording import Record, Stream
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import Trajectory
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 SAMPLE = 0.004
 """Time between two lines of a log, s: 250 Hz."""

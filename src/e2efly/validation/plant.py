@@ -11,11 +11,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from e2efly.config.names import unknown
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.policy.contract import Contract
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles import Vehicle, unknown
-from e2efly.vehicles.vehicle import quantities, terms
+from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
 BESIDE = frozenset({"wind", "rotor_share", "plain_mixer"})
 """Disturbances that a flight may have in addition to another body."""

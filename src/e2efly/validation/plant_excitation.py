@@ -15,8 +15,8 @@ from e2efly.control.manoeuvres import DURATION, doublets, lines, softened, trimm
 from e2efly.logs.recording import Record, Stream
 from e2efly.validation.log import motion_streams
 from e2efly.validation.plant import Delay, Known, Plant, RigidState
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
 """Sample rates of gyroscope, accelerometer and rotor speeds, of the poses, and of the commands, Hz."""

@@ -10,7 +10,7 @@ from e2efly.control.vectors import Quat, Vec3
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.reality import Air
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 
 @dataclass(frozen=True)

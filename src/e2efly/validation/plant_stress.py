@@ -21,7 +21,7 @@ from e2efly.validation.reality import Air, Reality, check_realities
 from e2efly.validation.starts import draw_starts
 from e2efly.validation.stress import Report, draws
 from e2efly.validation.task_verdict import Verdicts, judge
-from e2efly.vehicles import Controller, Vehicle
+from e2efly.vehicles.vehicle import Controller, Vehicle
 
 FLIGHTS = 10
 """Default number of starts per row and criterion. Each takes a second on MuJoCo or through the firmware."""

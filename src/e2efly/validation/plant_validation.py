@@ -27,7 +27,7 @@ from e2efly.validation.plants import PLANTS, find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.validation.starts import Starts, draw_starts
 from e2efly.validation.task_verdict import Verdicts, judge
-from e2efly.vehicles import Controller, Vehicle
+from e2efly.vehicles.vehicle import Controller, Vehicle
 
 KEPT = 136
 """Memory of one control step of a flight on a plant, bytes. All steps of all flights are kept."""

@@ -12,8 +12,7 @@ import numpy as np
 from e2efly.control import Quat
 from e2efly.policy.odometry import Odometry
 from e2efly.validation.plant import Plant
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import quantities, terms
+from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
 
 @dataclass(frozen=True)

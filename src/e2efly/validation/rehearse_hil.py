@@ -38,7 +38,8 @@ from e2efly.validation.processes import (
 from e2efly.validation.rehearsal import REACH_IN_SIGHT
 from e2efly.validation.scene_files import SceneFile, ground_of
 from e2efly.validation.scenery import Scenery
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 SETTLE_S = 3.0
 """Duration of the bridge's hover before the policy takes over, s."""

@@ -28,7 +28,7 @@ from e2efly.flight.process import be_punctual
 from e2efly.policy.odometry import tilt_of, yaw_of
 from e2efly.validation.firmware_program import chosen
 from e2efly.validation.rig import POSE_NOISE, Rig, Transmitter
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 
 ROUND_S = 0.004
 """Interval between two checks of the control connection, s."""

@@ -18,7 +18,7 @@ from e2efly.logs.recording import Record, Stream
 from e2efly.validation.plant import Known
 from e2efly.validation.rig import Rig
 from e2efly.validation.sitl import FirmwareState
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 LINK_RATE_HZ = 100.0
 """Rate of the commands, Hz."""

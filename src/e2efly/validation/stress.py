@@ -14,8 +14,7 @@ from e2efly.environment.episodes import Episodes, run_stepwise, summary
 from e2efly.environment.stress_rows import ROWS, Draw, Row, check_rows, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import prepare
 from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
-from e2efly.vehicles import Controller
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import Controller, Vehicle
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from e2efly.simulation.physics.body import powered
 from e2efly.simulation.physics.integrate import rk4
 from e2efly.simulation.physics.state import Parts
 from e2efly.validation.sitl import FirmwareState
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.001
 """Length of a step of the rigid body, s."""

@@ -17,16 +17,9 @@ from typing import Any
 import numpy as np
 
 from e2efly.config.tables import read_table
-from e2efly.vehicles.vehicle import (
-    FAMILIES,
-    GRAVITY,
-    OF_FAMILIES,
-    Vehicle,
-    load_vehicle,
-    quantities,
-    read_values,
-    vehicle_file,
-)
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import FAMILIES, OF_FAMILIES, load_vehicle, read_values, vehicle_file
+from e2efly.vehicles.vehicle import Vehicle, quantities
 
 DRAWN = 20
 """Number of uniform random numbers that define a vehicle."""

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from e2efly.config.tables import read_table, shown
-from e2efly.vehicles.vehicle import CORRELATION, Vehicle, load_vehicle, quantities, sigmas_of, terms, vehicle_file
+from e2efly.vehicles.loading import CORRELATION, load_vehicle, sigmas_of, vehicle_file
+from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
 IDENTIFIED = "identified"
 """The name of this distribution in `randomize`."""

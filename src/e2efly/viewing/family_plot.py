@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.vehicles import Family, Vehicle, load_vehicle, vehicle_names
-from e2efly.vehicles.family import measured
+from e2efly.vehicles.family import Family, measured
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.style import BLUE, CYCLE, figure
 
 DRAWS, SEED = 1500, 0

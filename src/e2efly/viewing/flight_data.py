@@ -12,7 +12,7 @@ import numpy as np
 from e2efly.control import Quat
 from e2efly.logs.blackbox import Alignment, Blackbox
 from e2efly.logs.flight_log import FlightLog, Series
-from e2efly.vehicles import load_vehicle, vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.viewing.rate_response import EXCITATION, StepResponse, step_response
 
 AXES = ("roll", "pitch", "yaw")

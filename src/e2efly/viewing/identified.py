@@ -9,7 +9,7 @@ from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.identification import Found
 from e2efly.alignment.prediction import Prediction
 from e2efly.logs.recording import KINDS
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.style import BLUE, GREY, INK, VERMILLION, figure
 
 UNITS = {name: kind.unit for name, kind in KINDS.items()} | {"quaternion": "rad"}

@@ -15,7 +15,7 @@ from e2efly.config import ImuConfig
 from e2efly.config.drawing import INK
 from e2efly.simulation.physics import State
 from e2efly.simulation.sensors.imu import ImuState, measure
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.image_plots import Sight, scale, show
 from e2efly.viewing.sheet import BAR, DEPTH_NOISES, IMAGE_NOISES, noised
 from e2efly.viewing.style import BLUE, GREY, VERMILLION, figure

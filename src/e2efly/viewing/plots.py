@@ -18,7 +18,8 @@ from e2efly.config.run import LEARNED
 from e2efly.control import COMMAND_MODES
 from e2efly.environment.episodes import Episodes, wilson
 from e2efly.runs.rundir import least_success
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.space import plot_flights
 from e2efly.viewing.style import BLUE, CYCLE, GREEN, GREY, PURPLE, VERMILLION, figure, say

@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
 
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 CLEAR, WANTED = 0.3, 0.9
 """`CLEAR`: minimum distance from solids in the search for a path, m. `WANTED`: the path is pushed away from solids that

@@ -16,7 +16,7 @@ from e2efly.validation.fleet import Flight, Mission, fly_all
 from e2efly.validation.plant_validation import Validation
 from e2efly.validation.reality import Reality
 from e2efly.validation.task_verdict import judge
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import PLACES, Pair
 from e2efly.viewing.objects import scene

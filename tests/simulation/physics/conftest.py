@@ -14,8 +14,7 @@ from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, step
 from e2efly.simulation.physics.airframe import Plant
 from e2efly.simulation.physics.state import Parts, split4
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import quantities
+from e2efly.vehicles.vehicle import Vehicle, quantities
 
 Fly = Callable[..., State]
 

@@ -12,8 +12,9 @@ from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics import State, body
 from e2efly.simulation.physics.airframe import Plant
 from e2efly.simulation.physics.state import split4
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, quantities
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, quantities
 
 pytestmark = pytest.mark.usefixtures("x64")
 

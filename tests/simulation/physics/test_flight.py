@@ -13,8 +13,9 @@ from e2efly.simulation.physics import INTEGRATORS, Physics, State, rotation
 from e2efly.simulation.physics.airframe import Plant
 from e2efly.simulation.physics.body import rotor_thrust
 from e2efly.simulation.physics.state import split4
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 pytestmark = pytest.mark.usefixtures("x64")
 

@@ -18,7 +18,8 @@ from e2efly.simulation.physics import Physics, State, step
 from e2efly.simulation.physics.airframe import Plant, Rotors
 from e2efly.simulation.physics.integrate import INTEGRATORS
 from e2efly.simulation.physics.state import Parts
-from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle
 
 pytestmark = pytest.mark.usefixtures("x64")
 

@@ -12,7 +12,7 @@ from jax.flatten_util import ravel_pytree
 
 from e2efly.control import COMMAND_MODES
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, rotation, step
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from tests.gradients import central, reverse
 
 pytestmark = pytest.mark.usefixtures("x64")

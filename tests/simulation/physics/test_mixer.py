@@ -6,8 +6,8 @@ import pytest
 
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import Mixer
-from e2efly.vehicles import Vehicle, load_vehicle
-from e2efly.vehicles.vehicle import allocation_matrix
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
 
 pytestmark = pytest.mark.usefixtures("x64")
 

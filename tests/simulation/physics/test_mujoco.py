@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from e2efly.simulation.physics import Physics, State
-from e2efly.vehicles import Vehicle, load_vehicle
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 STEP = 1e-3
 SECONDS = 2.0

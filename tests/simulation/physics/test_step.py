@@ -9,7 +9,7 @@ import pytest
 
 from e2efly.control import COMMAND_MODES
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, step
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 N = 6
 

@@ -15,9 +15,8 @@ from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, Physics, RateLoop, State, started, step
 from e2efly.simulation.physics.airframe import Plant
 from e2efly.simulation.physics.body import angular_acceleration
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.terms import BATTERY, battery_share
-from e2efly.vehicles.vehicle import inertia_tensor, terms
+from e2efly.vehicles.vehicle import Vehicle, inertia_tensor, terms
+from e2efly.vehicles.vehicle_rules import BATTERY, battery_share
 from tests.gradients import central, reverse
 from tests.terms import VALUES
 

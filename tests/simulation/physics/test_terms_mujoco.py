@@ -15,7 +15,7 @@ from e2efly.simulation.physics import INTEGRATORS, State
 from e2efly.simulation.physics.airframe import Plant
 from e2efly.simulation.physics.body import derivative, rotor_speed_for
 from e2efly.simulation.physics.state import Parts, split4
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 pytestmark = pytest.mark.usefixtures("x64")
 

@@ -11,8 +11,8 @@ from e2efly.config import ImuConfig
 from e2efly.environment import random_key
 from e2efly.simulation.physics import State, rotation
 from e2efly.simulation.sensors import imu
-from e2efly.vehicles import load_vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.noise_plots import allan_deviation
 
 DT = 1 / 30

@@ -12,7 +12,7 @@ from e2efly.environment import Env, EnvState, random_key
 from e2efly.simulation.physics import State
 from e2efly.simulation.sensors.latency import acting_commands, delayed_state, frames
 from e2efly.tasks.hover import HoverConfig
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from tests.gradients import central, reverse
 
 PERIOD = 1 / 30

@@ -12,10 +12,10 @@ from e2efly.commands.cli import run
 from e2efly.flight.pose.sources import open_source
 from e2efly.simulation.scenes.faces import box
 from e2efly.validation.processes import free_port
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.film import Soup, beside, film, picture
 from e2efly.viewing.watch.poses import Poses
-from e2efly.viewing.watch.recording import PERIOD, Recording, read_flight
+from e2efly.viewing.watch.recorded import PERIOD, Recording, read_flight
 from e2efly.viewing.watch.stage import Frame
 from e2efly.viewing.watch.triangles import SKY, mesh_of
 

@@ -9,7 +9,7 @@ import pytest
 
 from e2efly.commands.cli import run
 from e2efly.viewing.kept import flights_file, read_flights
-from e2efly.viewing.watch.recording import PERIOD, Recording
+from e2efly.viewing.watch.recorded import PERIOD, Recording
 from e2efly.viewing.watch.report import read_report, report_of
 
 

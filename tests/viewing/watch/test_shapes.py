@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from e2efly.vehicles import load_vehicle
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.triangles import mesh_of, quadrotor, spun, turned
 
 

@@ -15,7 +15,8 @@ from e2efly.flight.pilot.hovering import HOVERS, ROTOR_SPEED, HoverController
 from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.contract import Contract
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 QUADX = 3
 """Betaflight's number of the mixer of a quadrotor in X."""

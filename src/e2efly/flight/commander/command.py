@@ -15,7 +15,7 @@ from e2efly.flight.pose.json_source import array_of, header_of, number_of, objec
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import MODES
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 WHAT = "command"
 """The name of a command in messages."""

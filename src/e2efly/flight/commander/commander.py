@@ -18,7 +18,7 @@ from e2efly.flight.settings import FlightSettings
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.policy.runtime import Decision, Envelope, Imu, beyond
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 NAME = "commander"
 """The name in the log."""

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 from e2efly.flight.filter.arithmetic import Number, clip
 from e2efly.flight.filter.forecast import Command, Motion, Residual, Response
 from e2efly.flight.filter.turn import Step, steps_of
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 TILT_GAIN = 9.0
 """Body rate divided by the angle that remains to turn, 1/s. It may be this large because the state is forecast to the

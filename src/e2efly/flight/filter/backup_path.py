@@ -22,7 +22,7 @@ from e2efly.flight.filter.backup import (
     brake,
 )
 from e2efly.flight.filter.forecast import NOTHING, Motion, Residual
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 
 class Way(NamedTuple):

@@ -19,7 +19,8 @@ from e2efly.flight.filter.forecast import NOTHING, Actuators, Command, Motion, R
 from e2efly.flight.filter.margins import NAMES, Limits, against, near, retreat, rooms
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 HOLD = 0.01
 """A command is judged as if it were held for this time, s."""

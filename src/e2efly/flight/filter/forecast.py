@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from e2efly.flight.filter.arithmetic import Number
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 
 class Command(NamedTuple):

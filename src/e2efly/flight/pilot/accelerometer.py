@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from e2efly.flight.attitude import Attitude
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 COUNTS = (200.0, 9000.0)
 """Counts per gravity that controllers use: 256 to 8192, with a margin for their errors."""

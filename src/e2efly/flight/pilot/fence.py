@@ -8,7 +8,7 @@ from e2efly.control import Quat, Vec3
 from e2efly.flight.pilot.flight_state import Pilot, Reason, Target
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 MARGIN = 0.1
 """How far inside the fence a policy's flight comes to rest, m."""

@@ -16,7 +16,7 @@ from e2efly.flight.pilot.hover import LIFTED, blind, rates_of
 from e2efly.flight.pilot.hovering import HoverController, Seen, UnderWay
 from e2efly.flight.pilot.inertial import Inertial
 from e2efly.flight.pilot.touch import LOW, UNDER, wave
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 TRIM = (-3.0, 5.0)
 """Bounds of the thrust that a take-off adds while the throttle map is still wrong, m/s^2."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from e2efly.flight.attitude import Attitude
 from e2efly.policy.odometry import Odometry, yaw_of
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 SMOOTHING_S = 0.15
 """Time over which velocities are differentiated to accelerations, s."""

@@ -9,7 +9,8 @@ import numpy as np
 from e2efly.control import COMMAND_MODES, Ctbr, Quat, Vec3
 from e2efly.flight.attitude import Attitude
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 LEVEL_GAIN = 4.0
 """Body rate divided by tilt in a blind descent, 1/s."""

@@ -17,7 +17,7 @@ from e2efly.flight.pilot.motion_watch import MotionWatch
 from e2efly.flight.pilot.reckoning import ANCHOR_S, ANCHORS, Reckoning, Reckonings
 from e2efly.flight.pilot.touch import Touch
 from e2efly.policy.odometry import Odometry
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 FRESH_S = 0.1
 """How long a measured force is used, s."""

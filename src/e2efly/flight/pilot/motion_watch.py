@@ -18,7 +18,7 @@ from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.accelerometer import level
 from e2efly.flight.pose.tracking import rotation_between
 from e2efly.policy.odometry import Odometry, yaw_of
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 MEMORY_S = 0.5
 """Time over which changes are compared, s."""

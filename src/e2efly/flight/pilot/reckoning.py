@@ -18,7 +18,7 @@ from e2efly.flight.attitude import Attitude, turned
 from e2efly.flight.pilot.accelerometer import level
 from e2efly.flight.pilot.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_FASTER, SINK_SPEED
 from e2efly.policy.odometry import Odometry, yaw_of
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 LONGEST_STEP = 2.5
 """The longest step, s: a bridge that was stopped goes on with what the controller has held meanwhile. After a longer

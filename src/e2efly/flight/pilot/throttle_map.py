@@ -19,7 +19,8 @@ import numpy as np
 
 from e2efly.config.storage import finite, unique
 from e2efly.config.tables import shown
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 SCALE_RANGE = (0.5, 2.0)
 """Bounds of the learned factor."""

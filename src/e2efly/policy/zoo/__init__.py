@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from e2efly.vehicles import load_family, load_vehicle, unknown, vehicle_file
-from e2efly.vehicles.vehicle import FAMILIES
+from e2efly.config.names import unknown
+from e2efly.vehicles.family import load_family
+from e2efly.vehicles.loading import FAMILIES, load_vehicle, vehicle_file
 
 FOLDER = Path(__file__).parent
 USUAL = "vis_r"

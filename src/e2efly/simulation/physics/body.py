@@ -7,8 +7,9 @@ from jax import Array
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics.airframe import Plant, Rotors
 from e2efly.simulation.physics.state import Parts
-from e2efly.vehicles.terms import LEAST_VOLTAGE
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle, quantities, terms
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle, quantities, terms
+from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
 jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
 

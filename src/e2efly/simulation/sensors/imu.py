@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from e2efly.config import ImuConfig
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import unrotate
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
 
 jax.tree_util.register_dataclass(
     ImuConfig, data_fields=[f for f in ImuConfig.__annotations__ if f != "observed"], meta_fields=["observed"]

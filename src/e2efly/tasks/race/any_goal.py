@@ -10,7 +10,7 @@ from e2efly.courses.gates import STRAIGHT_ON, Tracks
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
-from e2efly.tasks.race.goal import Racing
+from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.verdicts import distance, offsets
 
 SHOWN = 3

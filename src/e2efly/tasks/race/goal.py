@@ -19,55 +19,13 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory
+from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.route import Route
-from e2efly.tasks.verdicts import distance, offsets, touches_ground
+from e2efly.tasks.verdicts import offsets
 
 CRUISE = 3.0
 """Speed of a controller that is not a policy, m/s."""
-
-
-class Racing(Goal):
-    """Fly through gates in order."""
-
-    config: RaceConfig
-    shape: Shape
-
-    def place(self, memory: Any) -> tuple[int, int]:
-        """For a single flight (n = 1): the next gate and the lap, both counted from 1."""
-        raise NotImplementedError
-
-    def verdict(
-        self, memory: Any, before: Any, after: Any, gates: Gates, index: Array, end: Array, fence: Array
-    ) -> tuple[Array, Outcome]:
-        """The outcome of a step, and which vehicles have passed a gate in it.
-
-        Args:
-            memory: the task's state before the step.
-            before: the vehicles at the start of the step.
-            after: the vehicles at its end.
-            gates: the gates of the track, or of each world's track.
-            index: (n,) the next gate, counted from 0 within a lap.
-            end: (n,) whether a vehicle that passes this gate has finished.
-            fence: largest allowed distance from this gate, m.
-        """
-        passed, missed, struck = gates.judge(index, before.position, after.position, self.shape.radius)
-        error = distance(after.position, self.goal(memory, index))
-        crashed = missed | struck | (error > fence) | touches_ground(self.shape, after)
-        passed = passed & ~crashed
-        finished = passed & end
-        return passed, Outcome(
-            terminated=crashed | finished, success=finished, arrived=passed, crashed=crashed, error=error,
-            signals={"missed": missed, "struck": struck},
-        )  # fmt: skip
-
-    def failure(self, memory: Any, outcome: Outcome) -> str:
-        """The gate that was missed or touched, if this is the reason."""
-        where = "gate {} of lap {}".format(*self.place(memory))
-        if outcome.signals["missed"][0]:
-            return f"{where} missed"
-        if outcome.signals["struck"][0]:
-            return f"frame struck on the way to {where}"
-        return f"{super().failure(memory, outcome)}, {where}"
 
 
 @dataclass(frozen=True)
@@ -83,11 +41,7 @@ class RaceGoal(Racing):
     @classmethod
     def showing(cls, names: Sequence[str]) -> type[Goal]:
         """`AnyRaceGoal` if the observation contains the axes of gates, otherwise this class."""
-        if "gate_axes" not in names:
-            return cls
-        from e2efly.tasks.race.any_goal import AnyRaceGoal  # extends a class of this module
-
-        return AnyRaceGoal
+        return AnyRaceGoal if "gate_axes" in names else cls
 
     @property
     def count(self) -> int:
@@ -167,8 +121,6 @@ class RaceRoute(Route):
         """The same course, also for a policy whose observation describes any track."""
         if "gate_axes" not in (field.name for field in contract.observation):
             return super().course_of(contract, shape)
-        from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory  # these extend classes of this module
-
         track = self._track()
         return self._placed(AnyRaceGoal(self._options(), shape), Memory(Tracks.of(track), np.zeros(1, int)), track)
 

@@ -13,8 +13,7 @@ import numpy as np
 from e2efly.policy.images import Image
 from e2efly.validation.airsim.airsim_camera import IMAGE_TYPES
 from e2efly.validation.airsim.rpc import PORT
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import inertia_tensor, terms
+from e2efly.vehicles.vehicle import Vehicle, inertia_tensor, terms
 
 CELL = 4
 """Smallest number of AirSim pixels per row and column of the policy's image, if its pixels are not square. AirSim's

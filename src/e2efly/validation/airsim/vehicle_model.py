@@ -10,8 +10,8 @@ import numpy as np
 
 from e2efly.validation.airsim.lockstep import Session
 from e2efly.validation.plant import RigidState
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY, allocation_matrix, inertia_tensor
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, inertia_tensor
 
 HEIGHT = 30.0
 """Height above the place where AirSim has put the vehicle, m."""

@@ -14,8 +14,8 @@ from e2efly.validation.airsim.rpc import PORT, Rpc
 from e2efly.validation.airsim.vehicle_model import LONG_S, SPUN_S, differences, hold, measure
 from e2efly.validation.plant import MOMENT, Plant, RigidState, Shutter, check_mode
 from e2efly.validation.plants.registry import register
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import GRAVITY
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 FLOOR_M = 0.02
 """Distance of AirSim's floor below the floor of our world, m. AirSim's collisions end a descent slightly above the

@@ -12,8 +12,7 @@ from e2efly.flight.betaflight.sticks import Sticks
 from e2efly.flight.pilot.hover import controlled
 from e2efly.validation.plant import EVERYTHING, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.vehicle import RATE_LOOP
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
 
 if TYPE_CHECKING:
     from e2efly.flight.bridge import Bridge

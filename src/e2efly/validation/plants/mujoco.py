@@ -27,9 +27,9 @@ from e2efly.control import Quat, Vec3
 from e2efly.validation.flight_controller import FlightController, rotor_speed_of
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
-from e2efly.vehicles import Vehicle
-from e2efly.vehicles.terms import LEAST_VOLTAGE
-from e2efly.vehicles.vehicle import GRAVITY, RATE_LOOP, inertia_tensor, rotor_arms
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle, inertia_tensor, rotor_arms
+from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
 STEP = 1e-3
 """Longest step of MuJoCo and of the rate loop, s."""

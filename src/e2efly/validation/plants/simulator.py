@@ -8,7 +8,7 @@ import numpy as np
 from e2efly.policy.contract import Contract
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 _STILL = None, None
 """No wind, and full thrust."""

@@ -13,7 +13,7 @@ from e2efly.viewing.watch.stage import Frame
 from e2efly.viewing.watch.viewer import CAMERAS, Viewer
 
 if TYPE_CHECKING:
-    from e2efly.viewing.watch.recording import Recording
+    from e2efly.viewing.watch.recorded import Recording
     from e2efly.viewing.watch.report import Shown
     from e2efly.viewing.watch.simulation import Simulation
     from e2efly.viewing.watch.training import Progress

@@ -11,7 +11,7 @@ from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.pose.tracking import Track, track
 from e2efly.policy.odometry import Odometry
 from e2efly.simulation.scenes.faces import Body
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.watch.stage import Frame, Stage
 
 LOST_S, RESTART_S = 0.3, 1.0

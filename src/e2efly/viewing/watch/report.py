@@ -13,11 +13,11 @@ from e2efly.config.reading import read
 from e2efly.config.storage import read_json
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.starts import Starts, draw_starts
-from e2efly.vehicles import Controller, Vehicle
+from e2efly.vehicles.vehicle import Controller, Vehicle
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import Pair, flights_file, read_flights
 from e2efly.viewing.watch.poses import TURNING
-from e2efly.viewing.watch.recording import Flight, even
+from e2efly.viewing.watch.recorded import Flight, even
 from e2efly.viewing.watch.simulation import stage
 from e2efly.viewing.watch.stage import Stage
 

@@ -19,7 +19,7 @@ from e2efly.environment.episodes import Act
 from e2efly.environment.stress_rows import with_longer_queue
 from e2efly.simulation.device import fast_compile, wide_vectors
 from e2efly.simulation.scenes.faces import bodies
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.image_plots import in_colours
 from e2efly.viewing.watch.stage import Frame, Stage
 

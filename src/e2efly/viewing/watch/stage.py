@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from e2efly.config.drawing import Thing
 from e2efly.simulation.scenes.faces import Body
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from e2efly.config.drawing import Face
 from e2efly.simulation.scenes.faces import Quads, box, cylinder
-from e2efly.vehicles import Vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 DARK, FRONT, METAL = (0.16, 0.17, 0.2), (0.93, 0.45, 0.13), (0.55, 0.57, 0.6)
 """RGB of body and rear arms, of the arms in front, and of motors."""

@@ -4,7 +4,8 @@ from e2efly.control import Ctbr, Motion, Quat, Vec3
 from e2efly.control.cascade import accelerate, limited, pull
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 SHARE = 0.2
 """Rate of change of the integral divided by the velocity error, in units of the velocity gain squared. It is a fifth,

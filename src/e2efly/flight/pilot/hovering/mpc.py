@@ -21,7 +21,8 @@ from e2efly.flight.pilot.hovering.loops import LIMIT, steer
 from e2efly.flight.pilot.hovering.plan import Plan, Solve, planned
 from e2efly.flight.pilot.hovering.registry import register
 from e2efly.flight.pilot.hovering.response import Seen, UnderWay, ahead, residue, slipped
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 OBSERVER = 2.0
 """Both poles of the observer, 1/s."""

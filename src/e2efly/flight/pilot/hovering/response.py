@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.control.place import ZERO
 from e2efly.control.vectors import Array, namespace
-from e2efly.vehicles.vehicle import GRAVITY, Vehicle
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.vehicle import Vehicle
 
 LONGEST_STEP = 0.02
 """The longest step of the prediction, s."""

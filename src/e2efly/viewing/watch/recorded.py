@@ -10,7 +10,8 @@ from jaxtyping import Float
 from e2efly.control import Quat
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.readers import OURS, format_of, read_flights
-from e2efly.vehicles import Vehicle, load_vehicle, vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.watch.stage import Frame, Stage
 
 PERIOD = 1 / 30
