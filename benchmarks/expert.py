@@ -12,7 +12,7 @@ import jax
 from common import arguments, table, write
 
 from e2efly.environment import Env, random_key
-from e2efly.environment.episodes import UnderWay, summary
+from e2efly.environment.episodes import EpisodesUnderWay, summary
 from e2efly.runs.presets import preset
 from e2efly.simulation.device import prepare
 
@@ -27,10 +27,10 @@ def flown(speed: float, nominal: bool, episodes: int) -> dict[str, Any]:
 
     @jax.jit
     def fly(env: Env) -> Any:
-        def step(flight: UnderWay, _: None) -> tuple[UnderWay, None]:
+        def step(flight: EpisodesUnderWay, _: None) -> tuple[EpisodesUnderWay, None]:
             return flight.after(env, env.expert_action(flight.state), 0.0), None
 
-        start = UnderWay.of(*env.reset(random_key(1), episodes))
+        start = EpisodesUnderWay.of(*env.reset(random_key(1), episodes))
         return jax.lax.scan(step, start, None, length=steps)[0].episodes(env)
 
     return summary(fly(env))

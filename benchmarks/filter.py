@@ -24,8 +24,8 @@ from filter_firmware import through_firmware
 from filter_flights import KINDS, Seen, adversaries, drawn_fences, fly, swapped
 
 from e2efly.control import Quat
-from e2efly.flight.filter.filter import Filter, Memory, filtered, remember, stopping_distance, watch
-from e2efly.flight.filter.forecast import Command
+from e2efly.flight.filter.filter import Filter, FilterMemory, filtered, remember, stopping_distance, watch
+from e2efly.flight.filter.forecast import ForecastCommand
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.pilot.hover import controlled, rates_of
 from e2efly.flight.settings import Fence
@@ -130,15 +130,15 @@ def zoo(episodes: int) -> list[dict[str, Any]]:
 
 def judged(filter: Filter, flight: Any, mode: str, lands: bool) -> int:
     """The steps of a flight in which the filter would change the command."""
-    vehicle, memory, changed = load_vehicle(VEHICLE), Memory(), 0
+    vehicle, memory, changed = load_vehicle(VEHICLE), FilterMemory(), 0
     for k in range(-20, 0):
-        memory = remember(memory, Command(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
+        memory = remember(memory, ForecastCommand(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
     for k, command in enumerate(flight.command):
         now = float(flight.time[k])
         o = Odometry(now, flight.position[k], flight.velocity[k], flight.quaternion[k], flight.body_rate[k])
         memory = watch(filter, memory, o, now, flying=True)
         asked = controlled(vehicle, mode, o, command)
-        wanted = Command(float(asked.thrust), *rates_of(asked))
+        wanted = ForecastCommand(float(asked.thrust), *rates_of(asked))
         changed += filtered(filter, memory, o, now, wanted, floor=not lands).share > 0
         memory = remember(memory, wanted, now)
     return changed
@@ -148,16 +148,16 @@ def timed(calls: int = 20000) -> list[dict[str, Any]]:
     """Part 3: seconds of the processor for a call of `watch`, `filtered` and `remember`."""
     vehicle = load_vehicle(VEHICLE)
     filter = Filter.of(vehicle, Fence((-5.0, -5.0, 0.2), (5.0, 5.0, 6.0), speed=6.0), LATENCY)
-    random, memory = np.random.default_rng(0), Memory()
+    random, memory = np.random.default_rng(0), FilterMemory()
     for k in range(-20, 0):
-        memory = remember(memory, Command(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
+        memory = remember(memory, ForecastCommand(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
     spent = {"passed": [], "changed": []}
     for k in range(calls):
         p, v = random.uniform([-4.5, -4.5, 0.5], [4.5, 4.5, 5.5]), random.uniform(-3, 3, 3)
         q = np.array([3.0, *random.normal(size=3)])
         now = k * 0.01
         o = Odometry(now, p, v, q / np.linalg.norm(q), random.uniform(-2, 2, 3))
-        wanted = Command(random.uniform(3, 20), *random.uniform(-5, 5, 3).tolist())
+        wanted = ForecastCommand(random.uniform(3, 20), *random.uniform(-5, 5, 3).tolist())
         began = time.thread_time_ns()
         memory = watch(filter, memory, o, now, flying=False)
         found = filtered(filter, memory, o, now, wanted)
@@ -181,9 +181,9 @@ def room() -> list[dict[str, Any]]:
     for name in ("vis_r", "vis_h"):
         vehicle = load_vehicle(name)
         filter = Filter.of(vehicle, fence)
-        memory = Memory()
+        memory = FilterMemory()
         for k in range(-20, 0):
-            memory = remember(memory, Command(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
+            memory = remember(memory, ForecastCommand(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)
         for speed in (1.0, 2.0, 4.0):
             counts = np.zeros(2)
             places, angles = random.uniform(low, high, (2000, 3)), np.linspace(0, 2 * np.pi, 16, endpoint=False)
@@ -193,7 +193,7 @@ def room() -> list[dict[str, Any]]:
                     v = speed * np.array([np.cos(angle), np.sin(angle), 0.0])
                     o = Odometry(0.0, p, v, np.array([1.0, 0, 0, 0]), np.zeros(3))
                     known = watch(filter, memory, o, 0.0, flying=True)
-                    passes = filtered(filter, known, o, 0.0, Command(GRAVITY, 0.0, 0.0, 0.0)).share == 0
+                    passes = filtered(filter, known, o, 0.0, ForecastCommand(GRAVITY, 0.0, 0.0, 0.0)).share == 0
                     free &= [fence_problem(fence, o) is None, passes]
                     if not free.any():
                         break

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from e2efly.flight.filter.backup import Backup
-from e2efly.flight.filter.filter import Filter, Filtered, Memory, filtered, remember, stopping_distance, watch
-from e2efly.flight.filter.forecast import Command
-from e2efly.flight.filter.margins import NAMES, Limits
+from e2efly.flight.filter.filter import Filter, Filtered, FilterMemory, filtered, remember, stopping_distance, watch
+from e2efly.flight.filter.forecast import ForecastCommand
+from e2efly.flight.filter.margins import NAMES, MarginLimits
 from e2efly.flight.pilot.hover import controlled, rates_of
 from e2efly.flight.settings import Fence
 from e2efly.policy.loader import load_policy
@@ -102,12 +102,12 @@ class Fences:
     tilt: float
     """rad."""
 
-    def limits(self, radius: float, margin: float) -> Limits:
+    def limits(self, radius: float, margin: float) -> MarginLimits:
         """As the filter takes them."""
-        one = Limits.of(Fence(low=(0.0,) * 3, high=(0.0,) * 3, speed=0.0, tilt=self.tilt), radius, margin)
+        one = MarginLimits.of(Fence(low=(0.0,) * 3, high=(0.0,) * 3, speed=0.0, tilt=self.tilt), radius, margin)
         low = tuple(self.low[:, i] + one.low[i] for i in range(3))
         high = tuple(self.high[:, i] + one.high[i] for i in range(3))
-        return Limits(low, high, self.speed + one.speed, one.tilt)  # type: ignore[arg-type]
+        return MarginLimits(low, high, self.speed + one.speed, one.tilt)  # type: ignore[arg-type]
 
     def gap(self, position: np.ndarray) -> np.ndarray:
         """Distance to the nearest wall, m; negative outside."""
@@ -227,7 +227,7 @@ def fly(
     advance = jax.jit(lambda s, c, w, r: step(physics, physics.nominal, s, c, wind=w, rotor_share=r))
     hover = np.tile([GRAVITY, 0.0, 0.0, 0.0], (n, 1))
     late = round(latency * RATE)
-    sent, memory = deque([hover] * late), Memory()
+    sent, memory = deque([hover] * late), FilterMemory()
     for i in range(20):
         memory = remember(memory, _command(hover), (i - 20) / RATE)
     wind, lost_at = np.zeros((n, 3)), random.uniform(0, seconds / 2, n) if sudden else np.full(n, -1.0)
@@ -269,12 +269,12 @@ def fly(
     return Seen(kind, gap, over_speed, over_tilt, changed / steps, top_speed, limits / steps, trace)
 
 
-def _command(rows: np.ndarray) -> Command:
-    return Command(*rows.T)
+def _command(rows: np.ndarray) -> ForecastCommand:
+    return ForecastCommand(*rows.T)
 
 
-def _line(i: int, k: int, memory: Memory, wanted: np.ndarray, given: np.ndarray, f: Filtered | None, p: np.ndarray,
-          v: np.ndarray, tilt: np.ndarray) -> dict[str, Any]:  # fmt: skip
+def _line(i: int, k: int, memory: FilterMemory, wanted: np.ndarray, given: np.ndarray, f: Filtered | None,
+          p: np.ndarray, v: np.ndarray, tilt: np.ndarray) -> dict[str, Any]:  # fmt: skip
     told = {} if f is None else {"room": f.room[i], "limit": NAMES[f.limit[i]], "share": f.share[i]}
     told["air"] = [np.broadcast_to(x, len(p))[i] for x in memory.air]
     return {

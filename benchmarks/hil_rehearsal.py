@@ -23,7 +23,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.hil_lap import Lap, Spread
 from e2efly.validation.processes import Victim, flags
-from e2efly.validation.rehearse_hil import Plan, rehearse
+from e2efly.validation.rehearse_hil import RehearsalPlan, rehearse
 
 WANTED, WANTED_S = 0.95, 0.015
 """Share of laps with success, and pose to image (99 %), s."""
@@ -58,15 +58,15 @@ def main() -> None:
     sys.exit(1 if few or late or any(lap.problems for lap in kills) else 0)
 
 
-def _plan(name: str, args: Namespace) -> Plan:
+def _plan(name: str, args: Namespace) -> RehearsalPlan:
     own = candidate(name, args.vehicle)
     changed = {"speed": tuple(args.speed)} if args.speed and own.task.name == "race_clutter" else {}
     found = candidate(name, args.vehicle, task=changed)
     delay = None if args.link_delay is None else float(args.link_delay)
-    return Plan(found, world=flags("task", found.task, own.task), link_delay=delay)
+    return RehearsalPlan(found, world=flags("task", found.task, own.task), link_delay=delay)
 
 
-def _fly(plan: Plan, seed: int, folder: Path, kill: Victim | None) -> Lap:
+def _fly(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None) -> Lap:
     lap = rehearse(plan, seed, folder, kill)
     print(plan.found.file.stem, seed, kill or "", lap.told, lap.problems or "ok", flush=True)
     return lap

@@ -36,7 +36,7 @@ from e2efly.simulation.scenes.cast import usual_light  # noqa: E402
 from e2efly.simulation.scenes.meshes.distance import DistanceGrid, clearance  # noqa: E402
 from e2efly.simulation.scenes.meshes.load import load_mesh_scene, mesh_scene_names  # noqa: E402
 from e2efly.simulation.scenes.meshes.mesh_cast import cast  # noqa: E402
-from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene, Part  # noqa: E402
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart, MeshScene  # noqa: E402
 
 CELL = 0.2
 
@@ -101,7 +101,7 @@ def grid_row(name: str, scene: MeshScene) -> dict[str, str]:
 def grid_error() -> tuple[float, float]:
     """Mean and largest error for a ball, m."""
     ball = trimesh.creation.icosphere(5, 1.0)
-    grid = DistanceGrid.of(MeshScene.of([Part("ball", np.asarray(ball.vertices), np.asarray(ball.faces))]), CELL)
+    grid = DistanceGrid.of(MeshScene.of([MeshPart("ball", np.asarray(ball.vertices), np.asarray(ball.faces))]), CELL)
     points = np.random.default_rng(0).uniform(-1.8, 1.8, (20_000, 3)).astype(np.float32)
     error = np.abs(np.asarray(clearance(grid, jnp.asarray(points))) - (np.linalg.norm(points, axis=1) - 1))
     return float(error.mean()), float(error.max())

@@ -14,7 +14,7 @@ import common
 from tests.mutations import mutated
 
 from e2efly.flight.betaflight.client import MESSAGES
-from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 
 GOLDEN = Path(__file__).parents[1] / "tests" / "data" / "msp_golden.json"
 STARTS = (b"$", b"$M>", b"$X<", b"\xff\xff")
@@ -44,7 +44,7 @@ def main() -> None:
     for name, piece in sources(frames, rng).items():
         decoder, size, found, parsed, refused, pieces, good_found, busy = Decoder(), 0, 0, 0, 0, 0, 0, 0.0
         while size < args.size / 3:
-            fuzz, good = piece(), Frame(rng.randrange(255), rng.randbytes(rng.randrange(300)), REPLY)
+            fuzz, good = piece(), MspFrame(rng.randrange(255), rng.randbytes(rng.randrange(300)), REPLY)
             cut = rng.randint(0, len(fuzz))
             start = time.perf_counter()
             seen = decoder.feed(fuzz[:cut]) + decoder.feed(fuzz[cut:]) + decoder.flush()

@@ -14,7 +14,7 @@ from common import arguments, table, write
 from pad_network import graph, learned, weights_of
 from pad_renders import SEEN, SIDE, UNSEEN, Variety, pictures
 
-from e2efly.flight.sight.segment.network import OWN, Network
+from e2efly.flight.sight.segment.network import OWN, PadNetwork
 
 BATCH = 256
 """Pictures that are drawn at once."""
@@ -31,7 +31,7 @@ def drawn(seed: int, n: int, variety: Variety) -> tuple[np.ndarray, np.ndarray]:
 
 def measured(name: str, colours: np.ndarray, truth: np.ndarray) -> list[dict[str, str]]:
     """Intersection over union of all pixels of all pictures, by the size of the pad."""
-    network = Network(OWN)
+    network = PadNetwork(OWN)
     found = np.stack([network(picture) for picture in colours]).astype(bool)
     truth, sizes = truth.astype(bool), truth.sum((1, 2))
     rows = []

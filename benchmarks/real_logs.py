@@ -29,7 +29,7 @@ from e2efly.alignment.shooting import measured_starts
 from e2efly.alignment.vehicle_file import merged
 from e2efly.alignment.windows import STEP, Windows, cut, join
 from e2efly.logs.csv_file import column_map
-from e2efly.logs.readers import Reading, read_part
+from e2efly.logs.readers import LogReading, read_part
 from e2efly.logs.recording import Record, Stream
 from e2efly.simulation.device import prepare
 from e2efly.vehicles.loading import load_vehicle
@@ -160,7 +160,7 @@ def own_nuisances(found: Found, q: np.ndarray, windows: Windows) -> np.ndarray:
 
 def nanobench(folder: Path, vehicle: Vehicle) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Positions 0.5, 1 and 2 s ahead of every flight, by the fit of those along other trajectories."""
-    reading = Reading(column_map(COLUMNS))
+    reading = LogReading(column_map(COLUMNS))
     records, refused = [], ""
     for path in sorted(folder.glob("*.csv")):
         try:

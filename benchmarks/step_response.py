@@ -30,7 +30,7 @@ from e2efly.simulation.device import prepare
 from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
-from e2efly.validation.steps import HOLD_S, Step, fly_steps
+from e2efly.validation.steps import HOLD_S, SetpointStep, fly_steps
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.alignment_plots import AFTER, ASKED, BEFORE, MEASURED, both
@@ -43,7 +43,9 @@ RISEN = 0.632
 COLUMNS = ("firmware", "simulator, before", "simulator, aligned")
 
 
-def responses(record: Record, steps: list[Step], found: Alignment, channel: int) -> tuple[np.ndarray, list[np.ndarray]]:
+def responses(
+    record: Record, steps: list[SetpointStep], found: Alignment, channel: int
+) -> tuple[np.ndarray, list[np.ndarray]]:
     """Times since a step, s, and the mean response as a share of the step: firmware, simulator before and after."""
     own = [step for step in steps if step.channel == channel]
     flown = stretches(record, [step.time - LEAD_S for step in own], LEAD_S + HOLD_S)

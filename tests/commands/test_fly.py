@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 
 from e2efly.commands.fly import Fly, parse
 from e2efly.commands.fly import run as fly_command
-from e2efly.flight.betaflight.codec import REPLY, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, MspFrame, encode
 from e2efly.flight.betaflight.messages import Name
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.logs.flight_log import read_log
@@ -92,7 +92,7 @@ def test_hostile_datagrams_forge_no_line_and_a_hang_up_ends_it_with_a_closed_log
 
 def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.CaptureFixture) -> None:
     def named(code: int) -> bytes:
-        return encode(Frame(code, f"[/]{FORGED}".encode(), REPLY)) if code == Name.CODE else recorded(code)
+        return encode(MspFrame(code, f"[/]{FORGED}".encode(), REPLY)) if code == Name.CODE else recorded(code)
 
     with controller(named) as client:
         pose = f"udp:{free_port(udp=True)}"

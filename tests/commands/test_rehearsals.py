@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flights_table
-from e2efly.validation.bridge_session import Flown
+from e2efly.validation.bridge_session import FlownSession
 from e2efly.validation.rehearsal import Rehearsal
 
 MODES = ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
@@ -16,7 +16,7 @@ REASONS = ("", "mission switch", "reached its height", "mission switch", "missio
 WHOLE = Rehearsal(
     modes=MODES, reasons=REASONS, complete=True, hover_error=0.0312, done=True, success=True, mean_error=0.02,
     final_error=0.123, final_speed=0.55, top_speed=11.25, arrivals=(), told="touched 12.3 cm off at 0.55 m/s",
-    flown=Flown(),
+    flown=FlownSession(),
 )  # fmt: skip
 CUT = ("settings: feature AIRMODE is off; needed: on: torque goes before thrust at any throttle (feature AIRMODE); "
        "no good odometry: nothing has come for 0.31 s")  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 
 from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, EnvState, expert, random_key
-from e2efly.environment.episodes import UnderWay
+from e2efly.environment.episodes import EpisodesUnderWay
 from e2efly.simulation import rewards
 from e2efly.tasks import TASKS
 
@@ -55,10 +55,10 @@ def test_flown_as_a_pilot_it_passes_forests_at_the_commanded_speed() -> None:
     env, n = forests(8.0), 60
     state, observation = begun(env, 1, n)
 
-    def fly(flight: UnderWay, _: None) -> tuple[UnderWay, None]:
+    def fly(flight: EpisodesUnderWay, _: None) -> tuple[EpisodesUnderWay, None]:
         return flight.after(env, env.expert_action(flight.state), 0.0), None
 
-    flight, _ = jax.jit(lambda f: jax.lax.scan(fly, f, None, length=300))(UnderWay.of(state, observation))
+    flight, _ = jax.jit(lambda f: jax.lax.scan(fly, f, None, length=300))(EpisodesUnderWay.of(state, observation))
     flown = flight.episodes(env)
     assert np.mean(flown.success) > 0.85
     assert np.mean(flown.mean_speed) > 0.85 * 8.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.commander.stream import Stream
+from e2efly.flight.commander.stream import CommandStream
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.policy.odometry import yaw_of
@@ -46,7 +46,7 @@ class Field:
         return np.asarray(self.rig.state.velocity)
 
     @property
-    def stream(self) -> Stream:
+    def stream(self) -> CommandStream:
         assert self.session.commander is not None
         return self.session.commander.stream
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.link import StreamLink
 from e2efly.flight.betaflight.messages import SET_RAW_RC
 from e2efly.flight.pose.pose_source import PoseSource
@@ -153,10 +153,10 @@ class FaultyLink:
         """Close the inner link."""
         self._inner.close()
 
-    def _treated(self, frame: Frame) -> bytes:
+    def _treated(self, frame: MspFrame) -> bytes:
         rewrite = self.rewrites.get(frame.code)
         if rewrite is not None and frame.direction == REPLY:
-            frame = Frame(frame.code, rewrite(frame.payload), frame.direction, frame.version, frame.flags)
+            frame = MspFrame(frame.code, rewrite(frame.payload), frame.direction, frame.version, frame.flags)
         data = encode(frame)
         if self._random.random() < self.spoilt:
             return self._random.bytes(len(data))

@@ -9,7 +9,7 @@ from unittest import mock
 
 from e2efly.flight.betaflight import watchdog
 from e2efly.flight.betaflight.link import Link
-from e2efly.flight.betaflight.watchdog import Plan, WatchedLink
+from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
 
 UNUSED = "tcp:127.0.0.1:1"
 """The link that a process would open; the thread is given one."""
@@ -90,7 +90,7 @@ class VirtualWatchdog:
         """From the controller."""
         return self._watched.receive()
 
-    def plan(self, plan: Plan) -> None:
+    def plan(self, plan: DescentPlan) -> None:
         """What it has to do without the bridge."""
         self._watched.plan(plan)
 

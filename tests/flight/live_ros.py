@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import e2efly
 from e2efly.flight.publish import Live, targets_of
 from e2efly.flight.sight.image_source import Frame
-from e2efly.flight.sight.quality import Seen
+from e2efly.flight.sight.quality import SeenImages
 
 CAMERA = e2efly.load_policy("avoid").contract.images[0]
 HALF = float(np.sqrt(0.5))
@@ -118,7 +118,7 @@ def heard(target: str, prefix: str, command: list[str]) -> Heard:
             live.record("rc", now, {"channels": [1500, 1000, 2000, 1750]})
             live.record("policy", now, {"observation": [0.5, None], "action": [0.25, 0.0, 0.0, -1.0], "step": 1})
             live.record("mode", now, MODE)
-            live.show([Seen(CAMERA, Frame(now, IMAGE))])
+            live.show([SeenImages(CAMERA, Frame(now, IMAGE))])
             time.sleep(0.02)
         subscriber.wait_for(11, time.monotonic() + 2)
         live.close()

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.flight.betaflight.client import MESSAGES, Client, ask, tell
-from e2efly.flight.betaflight.codec import Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import Decoder, MspFrame, encode
 from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import Debug, Rc, set_raw_rc
 
@@ -125,7 +125,7 @@ def raw_reply(code: int, version: int, client: Client) -> str:
     while client.backlog:
         client.poll(time.monotonic())
         time.sleep(0.001)
-    client.link.send(encode(Frame(code, version=version)))
+    client.link.send(encode(MspFrame(code, version=version)))
     data, end = b"", time.monotonic() + 5.0
     while time.monotonic() < end:
         data += client.link.receive()
@@ -178,8 +178,8 @@ def record(binary: str) -> dict[str, Any]:
             curves = []
             for i, tuning in enumerate(TUNINGS):
                 deadband = DEADBANDS.get(i, (0, 0))
-                tell(client, Frame(SET_RC_DEADBAND, struct.pack("<BBBH", *deadband, 0, 50)), 10.0)
-                tell(client, Frame(SET_RC_TUNING, tuning_payload(tuning)), 10.0)
+                tell(client, MspFrame(SET_RC_DEADBAND, struct.pack("<BBBH", *deadband, 0, 50)), 10.0)
+                tell(client, MspFrame(SET_RC_TUNING, tuning_payload(tuning)), 10.0)
                 rows = []
                 for offset in STICKS:
                     throttle = 1500 + offset

@@ -16,7 +16,7 @@ import pytest
 import e2efly
 from e2efly.flight.sight.captured import Captured
 from e2efly.flight.sight.image_source import Frame
-from e2efly.flight.sight.quality import Seen, see
+from e2efly.flight.sight.quality import SeenImages, see
 from e2efly.flight.sight.shared import place
 from e2efly.flight.sight.sources import open_image
 from tests.waiting import running, until
@@ -50,7 +50,7 @@ def test_a_video_is_read_in_its_colours_at_its_rate_and_ends_like_an_unplugged_c
     assert isinstance(source, Captured)
     assert source.describe().endswith(f"video.mp4, 96 rows, 128 columns (OpenCV {cv2.__version__})")
     frames: list[Frame] = []
-    seen = Seen(COLOURS)
+    seen = SeenImages(COLOURS)
     until(lambda: bool(frames.extend(source.read(time.monotonic()))) or source.problem is not None)
     assert len(frames) > 10
     for frame in frames:

@@ -18,7 +18,7 @@ from e2efly.control import COMMAND_MODES
 from e2efly.flight.commander.command import Limits, parse_command, within
 from e2efly.flight.commander.commander import LEASH, Commander, Heading, heading
 from e2efly.flight.commander.sources import open_commands
-from e2efly.flight.commander.stream import STEADY_S, Stream, take
+from e2efly.flight.commander.stream import STEADY_S, CommandStream, take
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import MODES, Envelope
@@ -137,13 +137,13 @@ def test_what_is_far_beyond_them_or_out_of_the_fence_is_refused(mode: str, chang
 # Time
 
 
-def followed(stream: Stream, message: bytes, received: float, **more: Any) -> Stream:
+def followed(stream: CommandStream, message: bytes, received: float, **more: Any) -> CommandStream:
     sender = more.pop("sender", "")
     return take(stream, parse_command(message, received, sender), LIMITS, STILL, received, 0.2, **more)
 
 
 def test_stamps_tell_the_age_and_what_is_late_goes_back_or_jumps_is_refused() -> None:
-    stream = followed(Stream(), said(stamp=5.0), 100.01)
+    stream = followed(CommandStream(), said(stamp=5.0), 100.01)
     stream = followed(stream, said(stamp=5.1), 100.16)  # 50 ms later than the first
     assert stream.time == pytest.approx(100.11, abs=1e-3)
     assert stream.age(100.16) == pytest.approx(0.05, abs=1e-3)
@@ -160,7 +160,7 @@ def test_stamps_tell_the_age_and_what_is_late_goes_back_or_jumps_is_refused() ->
 
 
 def test_a_clock_that_stands_ends_a_flight_and_only_then_the_stream_begins_anew() -> None:
-    stream = followed(Stream(), said(stamp=5.0), 100.0)
+    stream = followed(CommandStream(), said(stamp=5.0), 100.0)
     for i in range(1, 100):
         stream = followed(stream, said(stamp=5.0), 100.0 + 0.01 * i, flying=True)
     assert (stream.taken, stream.refused, stream.time) == (1, 99, 100.0)
@@ -169,7 +169,7 @@ def test_a_clock_that_stands_ends_a_flight_and_only_then_the_stream_begins_anew(
 
 
 def test_of_two_commanders_the_first_one_commands_until_it_is_silent() -> None:
-    stream = followed(Stream(), said(), 100.0, sender="a")
+    stream = followed(CommandStream(), said(), 100.0, sender="a")
     other = followed(stream, said(), 100.1, sender="b")
     assert other.problem == "command: from b, while a commands; accepted: one commander"
     assert other.time == 100.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from e2efly.flight.pilot.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
+from e2efly.flight.pilot.delay_watch import DelayWatch, MeasuredDelay, delay_of, delay_problem, felt, turned
 from e2efly.flight.pose.tracking import rotation_between
 from e2efly.policy.odometry import Odometry
 
@@ -141,8 +141,8 @@ def test_old_motion_is_forgotten() -> None:
 
 def test_a_delay_is_refused_in_words_only_where_it_is_surely_too_long() -> None:
     assert delay_problem(None, 0.05) is None
-    assert delay_problem(Delay(0.06, 0.01, 0.9), 0.05) is None
-    assert delay_problem(Delay(0.15, 0.002, 0.99), 0.05) == (
+    assert delay_problem(MeasuredDelay(0.06, 0.01, 0.9), 0.05) is None
+    assert delay_problem(MeasuredDelay(0.15, 0.002, 0.99), 0.05) == (
         "poses are 0.150 s late by the controller's gyro (within 0.004 s); accepted: 0.050 s; tell the source's delay "
         "by --latency, or mend it"
     )

@@ -8,7 +8,7 @@ import pytest
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot import guidance
-from e2efly.flight.pilot.estimate import OUTLIERS_S, RESTART_S, Estimate, enter, see
+from e2efly.flight.pilot.estimate import OUTLIERS_S, RESTART_S, StateEstimate, enter, see
 from e2efly.flight.pilot.flight_state import Flight, Mode, Target
 from e2efly.flight.pilot.hover import LIFTED, rates_of
 from e2efly.flight.pilot.hovering import Seen, UnderWay, hover_controller
@@ -29,14 +29,14 @@ def hovered(flight: Flight, target: Target, odometry: Odometry, trim: float) -> 
     return command, trim
 
 
-def told(before: Estimate, *samples: Sample, flight: Flight = HOVER, now: float | None = None) -> Estimate:
+def told(before: StateEstimate, *samples: Sample, flight: Flight = HOVER, now: float | None = None) -> StateEstimate:
     for one in samples:
         before = see(before, [one], flight, None, one.received)
     return before if now is None else see(before, [], flight, None, now)
 
 
-def good(flight: Flight = HOVER) -> Estimate:
-    return told(Estimate(Checks(), 0.1), *(sample(k * T) for k in range(50)), flight=flight)
+def good(flight: Flight = HOVER) -> StateEstimate:
+    return told(StateEstimate(Checks(), 0.1), *(sample(k * T) for k in range(50)), flight=flight)
 
 
 def test_one_outlier_ends_no_flight_but_outliers_that_last_do() -> None:

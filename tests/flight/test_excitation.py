@@ -11,7 +11,7 @@ from e2efly.control.manoeuvres import (
     PULSE,
     SWEEP,
     THRUST,
-    Room,
+    ManoeuvreRoom,
     chirps,
     fastest,
     kick_for,
@@ -118,7 +118,7 @@ def test_options_out_of_range_are_refused_by_name() -> None:
 
 def test_the_speed_is_stopped_from_within_the_room() -> None:
     room, _ = room_of(SETTINGS)
-    still = Room(room.low, room.high, 1e9, 0.0)
+    still = ManoeuvreRoom(room.low, room.high, 1e9, 0.0)
     assert np.allclose(still.stop(room.low, np.ones(3)), room.low)
     lengths = np.array([2.0, 5.0, 20.0])
     back = [length_for(v, room.braking, room.reaction) for v in fastest(lengths, room.braking, room.reaction)]
@@ -149,7 +149,7 @@ def test_a_kick_undoes_its_climb() -> None:
 
 
 def test_a_kick_shows_the_top_of_the_thrust_and_stops_within_the_room() -> None:
-    wide = Room(np.zeros(3), np.array([10.0, 10.0, 10.0]), 3.5, 0.45)
+    wide = ManoeuvreRoom(np.zeros(3), np.array([10.0, 10.0, 10.0]), 3.5, 0.45)
     assert GRAVITY + kick_for(FILE, wide) == pytest.approx(KICK * 4 * FILE.thrust_range[1] / FILE.mass)
-    low = Room(np.zeros(3), np.array([10.0, 10.0, 1.0]), 3.5, 0.45)
+    low = ManoeuvreRoom(np.zeros(3), np.array([10.0, 10.0, 1.0]), 3.5, 0.45)
     assert kick_for(FILE, low) * PULSE == pytest.approx(low.fastest[2])

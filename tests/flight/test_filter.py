@@ -12,10 +12,19 @@ from e2efly.control import Ctbr, Vec3
 from e2efly.courses.solids import DISC, SIZES, SQUARE
 from e2efly.flight.filter.arithmetic import SCALARS
 from e2efly.flight.filter.backup import GUST, UNSEEN, Backup, brake, command
-from e2efly.flight.filter.filter import Filter, Memory, feel, filtered, forecast, remember, stopping_distance, watch
-from e2efly.flight.filter.forecast import NOTHING, Command, Motion, moved
+from e2efly.flight.filter.filter import (
+    Filter,
+    FilterMemory,
+    feel,
+    filtered,
+    forecast,
+    remember,
+    stopping_distance,
+    watch,
+)
+from e2efly.flight.filter.forecast import NOTHING, ForecastCommand, ForecastMotion, moved
 from e2efly.flight.filter.guard import FilterError, Keeper, keep
-from e2efly.flight.filter.margins import NAMES, Limits, rooms
+from e2efly.flight.filter.margins import NAMES, MarginLimits, rooms
 from e2efly.flight.filter.obstacle import obstacles
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
@@ -27,7 +36,7 @@ from e2efly.vehicles.loading import load_vehicle
 VEHICLE = load_vehicle("vis_r")
 FENCE = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 6.0), speed=6.0, tilt=1.4)
 FILTER = Filter.of(VEHICLE, FENCE)
-HOVER = Command(GRAVITY, 0.0, 0.0, 0.0)
+HOVER = ForecastCommand(GRAVITY, 0.0, 0.0, 0.0)
 DT = 0.01
 
 
@@ -36,40 +45,44 @@ def pitched(tilt: float) -> tuple[float, float, float, float]:
     return math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0
 
 
-def state(x: float = 0.0, v: float = 0.0, tilt: float = 0.0, z: float = 3.0, vz: float = 0.0) -> Motion:
+def state(x: float = 0.0, v: float = 0.0, tilt: float = 0.0, z: float = 3.0, vz: float = 0.0) -> ForecastMotion:
     w, _, y, _ = pitched(tilt)
-    return Motion(x, 0.0, z, v, 0.0, vz, w, 0.0, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY / math.cos(tilt))
+    return ForecastMotion(x, 0.0, z, v, 0.0, vz, w, 0.0, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY / math.cos(tilt))
 
 
-def odometry(m: Motion, now: float) -> Odometry:
+def odometry(m: ForecastMotion, now: float) -> Odometry:
     p, v = np.array([m.px, m.py, m.pz]), np.array([m.vx, m.vy, m.vz])
     return Odometry(now, p, v, np.array([m.qw, m.qx, m.qy, m.qz]), np.array([m.wx, m.wy, m.wz]))
 
 
-def after(sent: Command = HOVER, m: Motion | None = None, filter: Filter = FILTER) -> tuple[Memory, Odometry]:
+def after(
+    sent: ForecastCommand = HOVER, m: ForecastMotion | None = None, filter: Filter = FILTER
+) -> tuple[FilterMemory, Odometry]:
     """The memory after a third of a second of one command, and the odometry of now, 0 s."""
-    memory = Memory()
+    memory = FilterMemory()
     for k in range(-34, 0):
         memory = remember(memory, sent, k * DT)
     seen = odometry(m or state(), 0.0)
     return watch(filter, memory, seen, 0.0, flying=True), seen
 
 
-def passes(wanted: Command, m: Motion, sent: Command = HOVER, filter: Filter = FILTER) -> bool:
+def passes(wanted: ForecastCommand, m: ForecastMotion, sent: ForecastCommand = HOVER, filter: Filter = FILTER) -> bool:
     memory, seen = after(sent, m, filter)
     return filtered(filter, memory, seen, 0.0, wanted).share == 0.0
 
 
-def fly(m: Motion, seconds: float, delay: float = 0.06, filter: Filter = FILTER, lean: float = 0.0) -> list[Motion]:
+def fly(
+    m: ForecastMotion, seconds: float, delay: float = 0.06, filter: Filter = FILTER, lean: float = 0.0
+) -> list[ForecastMotion]:
     """The forecast's own body behind a delay, with a policy that holds a lean to +x, rad, and no more; every state."""
-    memory, flown, late = Memory(), [m], round(delay / DT)
+    memory, flown, late = FilterMemory(), [m], round(delay / DT)
     pipe = [HOVER] * late
     for k in range(-34, 0):
         memory = remember(memory, HOVER, k * DT)
     for k in range(round(seconds / DT)):
         now, seen, body = k * DT, odometry(flown[-1], k * DT), flown[-1]
         memory = watch(filter, memory, seen, now, flying=True)
-        level = Command(GRAVITY, -6 * body.qx * body.qw, 3 * lean - 6 * body.qy * body.qw, 0.0)
+        level = ForecastCommand(GRAVITY, -6 * body.qx * body.qw, 3 * lean - 6 * body.qy * body.qw, 0.0)
         given = filtered(filter, memory, seen, now, level).command
         memory = remember(memory, given, now)
         pipe.append(given)
@@ -87,14 +100,16 @@ def test_far_from_everything_a_command_passes_bit_for_bit() -> None:
 @pytest.mark.parametrize(
     ("wanted", "limit"),
     [
-        (Command(14.0, 0.0, 4.0, 0.0), "x high"),
-        (Command(14.0, -4.0, 0.0, 0.0), "y high"),
-        (Command(2.0, 0.0, 0.0, 0.0), "floor"),
-        (Command(25.0, 0.0, 0.0, 0.0), "ceiling"),
-        (Command(GRAVITY, 9.0, 0.0, 0.0), "tilt"),
+        (ForecastCommand(14.0, 0.0, 4.0, 0.0), "x high"),
+        (ForecastCommand(14.0, -4.0, 0.0, 0.0), "y high"),
+        (ForecastCommand(2.0, 0.0, 0.0, 0.0), "floor"),
+        (ForecastCommand(25.0, 0.0, 0.0, 0.0), "ceiling"),
+        (ForecastCommand(GRAVITY, 9.0, 0.0, 0.0), "tilt"),
     ],
 )
-def test_one_command_for_ever_breaches_nothing_and_names_what_it_was_changed_for(wanted: Command, limit: str) -> None:
+def test_one_command_for_ever_breaches_nothing_and_names_what_it_was_changed_for(
+    wanted: ForecastCommand, limit: str
+) -> None:
     keeper, flown = Keeper(FILTER), [state()]
     pipe, limits = [HOVER] * 6, list[str]()
     for k in range(-34, 0):
@@ -113,7 +128,7 @@ def test_one_command_for_ever_breaches_nothing_and_names_what_it_was_changed_for
         assert given is not None and keeper.problem is None
         limits += [keeper.change.limit] if keeper.change else []
         keeper.sent(given, now)
-        pipe.append(Command(given.thrust, given.rate.x, given.rate.y, given.rate.z))
+        pipe.append(ForecastCommand(given.thrust, given.rate.x, given.rate.y, given.rate.z))
         flown.append(moved(SCALARS, FILTER.backup.response, flown[-1], pipe.pop(0), NOTHING, DT))
     assert limit in limits
     for m in flown:
@@ -131,7 +146,7 @@ def test_a_policy_that_was_stopped_at_a_wall_may_leave_it() -> None:
 
 def test_commands_on_their_way_count() -> None:
     m = state(x=5.0, v=2.0)
-    towards, away = Command(14.0, 0.0, 6.0, 0.0), Command(14.0, 0.0, -6.0, 0.0)
+    towards, away = ForecastCommand(14.0, 0.0, 6.0, 0.0), ForecastCommand(14.0, 0.0, -6.0, 0.0)
     assert passes(HOVER, m, away)
     assert not passes(HOVER, m, towards)
 
@@ -260,7 +275,7 @@ def test_a_scene_file_that_cannot_be_kept_is_refused_by_name(tmp_path: Path, tex
 
 
 def test_a_loss_of_thrust_is_noticed_and_made_up_for() -> None:
-    memory, m, now = Memory(), state(), 0.0
+    memory, m, now = FilterMemory(), state(), 0.0
     for k in range(60):
         now = k * DT
         memory = watch(FILTER, memory, odometry(m, now), now, flying=True)
@@ -321,15 +336,17 @@ def test_many_vehicles_at_once_are_filtered_as_each_alone() -> None:
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     wanted = np.column_stack([random.uniform(2, 25, n), random.uniform(-8, 8, (n, 3)) * [1, 1, 0.4]])
     w = random.uniform(-2, 2, (n, 3))
-    memory = Memory()
+    memory = FilterMemory()
     for k in range(-20, 0):
         memory = remember(memory, HOVER, k * DT)
     many = Odometry(0.0, p, v, q, w)
-    found = filtered(FILTER, watch(FILTER, memory, many, 0.0, flying=True), many, 0.0, Command(*wanted.T))
+    found = filtered(FILTER, watch(FILTER, memory, many, 0.0, flying=True), many, 0.0, ForecastCommand(*wanted.T))
     assert 5 < (found.share > 0).sum() < n
     for i in range(n):
         one = Odometry(0.0, p[i], v[i], q[i], w[i])
-        alone = filtered(FILTER, watch(FILTER, memory, one, 0.0, flying=True), one, 0.0, Command(*wanted[i].tolist()))
+        alone = filtered(
+            FILTER, watch(FILTER, memory, one, 0.0, flying=True), one, 0.0, ForecastCommand(*wanted[i].tolist())
+        )
         np.testing.assert_allclose([x[i] for x in found.command], alone.command, rtol=1e-9, atol=1e-9)
         assert found.share[i] == pytest.approx(alone.share)
         if alone.share == 0.0:
@@ -392,7 +409,7 @@ def test_what_the_filter_admits_lies_inside_of_what_can_be_kept_in_one_dimension
     # the best that the vehicle could do with a fifth less thrust in a gust, its rotors and rate loop without a lag
     steepest = min(math.acos(GRAVITY / backup.most), 1.0)
     exact = least_distance(float(vehicle.body_rate_max[1]), steepest, GUST)
-    limits = Limits((-99.0, -99.0, -99.0), (0.0, 99.0, 99.0), 99.0, math.inf)
+    limits = MarginLimits((-99.0, -99.0, -99.0), (0.0, 99.0, 99.0), 99.0, math.inf)
     needed = np.array([
         [-rooms(SCALARS, backup, limits, state(v=v, tilt=t), NOTHING)[NAMES.index("x high")] for t in TILTS]
         for v in SPEEDS

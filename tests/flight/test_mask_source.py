@@ -15,7 +15,7 @@ import pytest
 import e2efly
 from e2efly.flight.sight.fit import fitted
 from e2efly.flight.sight.mask_source import capture, colours_for
-from e2efly.flight.sight.quality import Seen, see
+from e2efly.flight.sight.quality import SeenImages, see
 from e2efly.flight.sight.shared import SharedImages, place
 from e2efly.flight.sight.sources import open_image
 from tests.flight.test_segment import CORNERS, HIGH, WIDE, polygon, tag
@@ -144,7 +144,7 @@ def test_a_tag_in_a_video_becomes_the_policys_mask(tmp_path: Path) -> None:
     source = open_image(f"mask:apriltag:36h11:7@v4l2:{path}?fov=policy", PAD)
     try:
         assert "480 rows, 640 columns (AprilTag 36h11, 7x1; v4l2:" in source.describe()
-        seen, end = Seen(PAD), time.monotonic() + 20
+        seen, end = SeenImages(PAD), time.monotonic() + 20
         while seen.frame is None:
             assert time.monotonic() < end
             seen = see(seen, source.read(time.monotonic()), time.monotonic(), trouble=source.problem)

@@ -23,7 +23,7 @@ from e2efly.flight.betaflight.client import (
     Client,
     ask,
 )  # fmt: skip
-from e2efly.flight.betaflight.codec import ERROR, REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import ERROR, REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.controller import identify
 from e2efly.flight.betaflight.link import MOST, open_link
 from tests.flight.msp_golden import REPLIES, payload
@@ -54,7 +54,7 @@ class Wire:
         count = len(self.sent) if limit is None else limit
         for frame in self.sent[:count]:
             data = payload(REPLIES[1][frame.code]) if frame.code in REPLIES[1] else b""
-            self.inbox += encode(Frame(frame.code, data, REPLY, frame.version))
+            self.inbox += encode(MspFrame(frame.code, data, REPLY, frame.version))
         del self.sent[:count]
 
 
@@ -78,7 +78,7 @@ def test_half_a_reply_that_runs_together_with_the_next_is_not_believed_though_it
     wire = Wire()
     client = Client(wire)
     client.poll(0.0)
-    first, second = encode(Frame(105, bytes(range(32)), REPLY)), encode(Frame(108, bytes(6), REPLY))
+    first, second = encode(MspFrame(105, bytes(range(32)), REPLY)), encode(MspFrame(108, bytes(6), REPLY))
     cut = first[:20] + second + second
     body = cut[3 : 3 + 2 + 32]
     check = 0
@@ -90,7 +90,9 @@ def test_half_a_reply_that_runs_together_with_the_next_is_not_believed_though_it
     assert set(client.latest) == {108}
 
 
-@pytest.mark.parametrize("junk", [bytes(100_000), b"$M>\xfe\x01" * 20_000, encode(Frame(254, bytes(8), REPLY)) * 6000])
+@pytest.mark.parametrize(
+    "junk", [bytes(100_000), b"$M>\xfe\x01" * 20_000, encode(MspFrame(254, bytes(8), REPLY)) * 6000]
+)
 def test_of_a_flood_the_newest_bytes_are_read_and_the_answer_at_its_end_is_found(
     junk: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,7 +139,9 @@ def test_refused_and_unreadable_answers_are_said() -> None:
     wire = Wire()
     client = Client(wire)
     client.poll(0.0)
-    wire.inbox = encode(Frame(108, b"", ERROR)) + encode(Frame(150, b"\0", REPLY)) + encode(Frame(7, b"x", REPLY))
+    wire.inbox = (
+        encode(MspFrame(108, b"", ERROR)) + encode(MspFrame(150, b"\0", REPLY)) + encode(MspFrame(7, b"x", REPLY))
+    )
     client.poll(0.1)
     assert "does not know or refuses" in client.errors[108]
     assert "STATUS_EX" in client.errors[150]
@@ -191,7 +195,7 @@ def test_a_message_longer_than_the_limit_is_asked_for_all_the_same() -> None:
 
     def answer() -> None:
         for frame in wire.sent:
-            wire.inbox += encode(Frame(frame.code, bytes(500), REPLY))
+            wire.inbox += encode(MspFrame(frame.code, bytes(500), REPLY))
         wire.sent.clear()
 
     assert run(client, wire, 1.0, answer)[116] >= 9
@@ -213,14 +217,14 @@ def test_sticks_go_first_and_their_replies_are_eaten() -> None:
     client.poll(0.001 + PROBE_S + 2e-3)
     assert len(wire.sent) == 1  # but for one message, now and then
     wire.sent.clear()
-    wire.inbox = encode(Frame(200, b"", REPLY)) * (MAX_BACKLOG + 1)
+    wire.inbox = encode(MspFrame(200, b"", REPLY)) * (MAX_BACKLOG + 1)
     client.poll(0.08)
     assert client.backlog == 0
     assert wire.sent
     assert 200 not in client.latest
 
 
-ACKNOWLEDGED = encode(Frame(messages.SET_RAW_RC, b"", REPLY))
+ACKNOWLEDGED = encode(MspFrame(messages.SET_RAW_RC, b"", REPLY))
 NOISE = b"$M>\x02\x6cab\x00"
 """A frame whose checksum is wrong."""
 
@@ -316,7 +320,7 @@ def test_where_another_program_asks_it_is_seen_and_less_is_asked() -> None:
 
         def each() -> None:
             wire.answer()
-            wire.inbox += encode(Frame(messages.Name.CODE, b"x", REPLY)) if foreign else b""
+            wire.inbox += encode(MspFrame(messages.Name.CODE, b"x", REPLY)) if foreign else b""
 
         counts = Counter(run(client, wire, 4.0, each))
         assert client.crowded(4.0) is foreign
@@ -334,7 +338,7 @@ def test_sticks_of_another_program_are_told_from_its_questions(code: int, steere
     wire = Wire()
     client = Client(wire, {})
     client.poll(0.0)
-    wire.inbox += encode(Frame(code, b"", REPLY))
+    wire.inbox += encode(MspFrame(code, b"", REPLY))
     client.poll(0.1)
     assert client.crowded(0.2)
     assert client.steered(0.2) is steered
@@ -490,13 +494,13 @@ def test_an_echo_of_requests_is_no_reply() -> None:
     client = Client(wire)
     client.poll(0.0)
     client.request(10, 0.0)
-    wire.inbox = encode(Frame(10))
+    wire.inbox = encode(MspFrame(10))
     client.poll(0.1)
     assert client.latest == {}
 
 
 def recorded(code: int) -> bytes:
-    return REPLIES[1].get(code, encode(Frame(code, b"", ERROR)))
+    return REPLIES[1].get(code, encode(MspFrame(code, b"", ERROR)))
 
 
 @contextmanager
@@ -557,7 +561,7 @@ def test_identify_the_recorded_controller() -> None:
     ],
 )
 def test_what_is_not_known_is_refused(code: int, data: bytes, words: str) -> None:
-    strange = encode(Frame(code, data, REPLY))
+    strange = encode(MspFrame(code, data, REPLY))
     with (
         controller(lambda asked: strange if asked == code else recorded(asked)) as client,
         pytest.raises(ValueError, match=words),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from e2efly.flight.pose.conditions import REASONS, Checks
 from e2efly.flight.pose.slope import follow_slope, noise_gain, slope, start_slope
-from e2efly.flight.pose.tracking import Track, age, rotation_between, track
+from e2efly.flight.pose.tracking import PoseTrack, age, rotation_between, track
 from e2efly.policy.odometry import Odometry, Sample
 
 LEVEL = np.array([1.0, 0, 0, 0])
@@ -24,8 +24,8 @@ def sample(time: float, x: float = 0.0, **changes: object) -> Sample:
     return replace(Sample(received=50 + time, stamp=time, position=position, quaternion=LEVEL), **changes)  # type: ignore
 
 
-def fly(checks: Checks, samples: list[Sample], start: Track | None = None) -> tuple[Track, list[tuple]]:
-    state, out = start or Track(), []
+def fly(checks: Checks, samples: list[Sample], start: PoseTrack | None = None) -> tuple[PoseTrack, list[tuple]]:
+    state, out = start or PoseTrack(), []
     for one in samples:
         state, odometry, reason = track(checks, state, one)
         assert odometry is None or reason is None
@@ -34,7 +34,7 @@ def fly(checks: Checks, samples: list[Sample], start: Track | None = None) -> tu
     return state, out
 
 
-def hovering(duration: float = 0.5, checks: Checks | None = None) -> Track:
+def hovering(duration: float = 0.5, checks: Checks | None = None) -> PoseTrack:
     state, out = fly(checks or Checks(), [sample(k * T) for k in range(round(duration / T))])
     assert out[-1][0] is not None
     return state
@@ -98,7 +98,7 @@ def test_whatever_comes_in_what_comes_out_is_finite_and_unit(value: float, place
                 assert np.isfinite(array).all()
             assert np.linalg.norm(odometry.quaternion) == pytest.approx(1, abs=1e-12)
             assert odometry.time <= 50.3 + dt + T + 1e-9
-    assert isinstance(after, Track)
+    assert isinstance(after, PoseTrack)
 
 
 def test_a_lasting_jump_stays_a_fault_until_the_track_starts_anew() -> None:
@@ -154,7 +154,7 @@ def test_a_lasting_turn_of_the_pose_never_passes_however_fast_the_vehicle_turns(
 @pytest.mark.parametrize("seed", range(20))
 def test_no_jump_is_refused_that_its_own_text_accepts(seed: int) -> None:
     """Outliers of all sizes among fast motion: what is refused by its size is beyond what the text accepts."""
-    random, state, said = np.random.default_rng(seed), Track(), []
+    random, state, said = np.random.default_rng(seed), PoseTrack(), []
     for k in range(300):
         one = spinning(k * 0.007)
         if random.random() < 0.3:
@@ -198,7 +198,7 @@ def test_samples_out_of_order_can_be_ignored() -> None:
 
 
 def test_before_the_first_odometry_the_age_is_infinite() -> None:
-    assert age(Track(), 5.0) == math.inf
+    assert age(PoseTrack(), 5.0) == math.inf
     state, out = fly(Checks(), [sample(0), sample(T)])
     assert out[0][1].startswith("starting: 1 samples in 0 s are too few for velocity")
     assert age(state, 60) == math.inf
@@ -211,7 +211,7 @@ def test_a_quaternion_is_normalised_within_the_tolerance() -> None:
 
 def test_a_source_that_gives_everything_is_used_from_its_first_sample() -> None:
     full = sample(0, velocity=np.array([0.1, 0, 0]), body_rate=np.array([0, 0.2, 0]))
-    _, odometry, reason = track(Checks(), Track(), full)
+    _, odometry, reason = track(Checks(), PoseTrack(), full)
     assert reason is None
     assert odometry is not None
     np.testing.assert_array_equal(odometry.velocity, [0.1, 0, 0])
@@ -228,7 +228,7 @@ def test_jitter_of_the_way_is_taken_out_of_the_times(drift: float) -> None:
     n, interval = 3000, 0.04
     delays = 0.002 + rng.exponential(0.004, n)
     true = 1000 + np.arange(n) * interval * (1 + drift)
-    state, error = Track(), []
+    state, error = PoseTrack(), []
     for k in range(n):
         one = sample(k * interval, received=float(true[k] + delays[k]))
         state, odometry, _ = track(Checks(), state, one)
@@ -242,7 +242,7 @@ def test_jitter_of_the_way_is_taken_out_of_the_times(drift: float) -> None:
 @given(st.lists(st.floats(0, 0.09), min_size=20, max_size=60), st.floats(-1e9, 1e9), st.floats(0, 0.05))
 @settings(max_examples=100, deadline=None)
 def test_no_sample_is_dated_after_its_arrival_or_too_far_before(delays: list[float], offset: float, lag: float) -> None:
-    checks, state, last = Checks(latency=lag), Track(), -math.inf
+    checks, state, last = Checks(latency=lag), PoseTrack(), -math.inf
     for k, delay in enumerate(delays):
         one = sample(k * T, stamp=k * T + offset, received=100 + k * T + delay)
         state, odometry, _ = track(checks, state, one)
@@ -314,7 +314,7 @@ def test_velocity_and_body_rate_of_a_circle_flown_with_noise() -> None:
     """2 m/s on a circle of 1 m, nose ahead, irregular samples: the errors are the stated delay and the stated noise."""
     rng = np.random.default_rng(2)
     times = np.cumsum(rng.uniform(0.006, 0.014, 3000))
-    state, errors, rates = Track(), [], []
+    state, errors, rates = PoseTrack(), [], []
     checks = Checks()
     for t in times.tolist():
         position = np.array([math.cos(2 * t), math.sin(2 * t), 1]) + 1e-3 * rng.standard_normal(3)
@@ -334,7 +334,7 @@ def test_velocity_and_body_rate_of_a_circle_flown_with_noise() -> None:
 
 def test_a_body_rate_is_about_the_body_s_axes() -> None:
     """Tilted a quarter turn about body y, then rolling about body x, which is world -z."""
-    state, checks = Track(), Checks(frozen_after=math.inf)
+    state, checks = PoseTrack(), Checks(frozen_after=math.inf)
     odometry: Odometry | None = None
     for k in range(50):
         quaternion = product(turned(math.pi / 2, axis=1), turned(1.5 * k * T, axis=0))
@@ -344,7 +344,7 @@ def test_a_body_rate_is_about_the_body_s_axes() -> None:
 
 
 def test_the_quaternion_is_continuous_though_the_source_flips_its_sign() -> None:
-    state, checks, last = Track(), Checks(), None
+    state, checks, last = PoseTrack(), Checks(), None
     for k in range(700):  # more than two turns
         q = turned(2 * k * T)
         state, odometry, reason = track(checks, state, sample(k * T, quaternion=q if k % 3 else -q))

@@ -23,7 +23,7 @@ import e2efly
 from e2efly.flight.log_record import Logs
 from e2efly.flight.publish import Live, targets_of
 from e2efly.flight.sight.image_source import Frame
-from e2efly.flight.sight.quality import Seen
+from e2efly.flight.sight.quality import SeenImages
 from e2efly.flight.sight.shared import place
 from e2efly.logs.channels import CHANNELS
 from e2efly.logs.flight_log import read_log
@@ -74,7 +74,7 @@ def fly(live: Live, rounds: int = 20) -> float:
         live.record("imu", now, {"gyro": [1.0, 2.0, 3.0], "specific_force": [0.0, float("nan"), 9.81]})
         live.record("policy", now, {"observation": np.arange(3.0), "action": [0.1, -0.2, 0.3, -0.4], "step": i})
     live.record("mode", start, MODE)
-    live.show([Seen(CAMERA, Frame(start, picture()))])
+    live.show([SeenImages(CAMERA, Frame(start, picture()))])
     return start
 
 
@@ -109,7 +109,7 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     start = time.monotonic()
     for i in range(100):  # until the subscription has come through
         live.record("odometry", time.monotonic(), {**ODOMETRY, "position": [float(i), 0.0, 0.0]})
-        live.show([Seen(CAMERA, Frame(time.monotonic(), picture()))])
+        live.show([SeenImages(CAMERA, Frame(time.monotonic(), picture()))])
         live.record("imu", start, {"gyro": [1.0, float("nan"), 3.0]})
         time.sleep(0.01)
     stamp, data = client.message("imu")
@@ -119,7 +119,7 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     client.subscribe(info, "/tf")
     for _ in range(50):
         live.record("odometry", time.monotonic(), ODOMETRY)
-        live.show([Seen(CAMERA, Frame(time.monotonic(), picture()))])
+        live.show([SeenImages(CAMERA, Frame(time.monotonic(), picture()))])
         time.sleep(0.01)
     calibration = client.message(info)[1]
     focal = CAMERA.width / 2 / np.tan(CAMERA.fov_rad[0] / 2)
@@ -219,7 +219,7 @@ def test_a_process_that_stands_still_costs_the_loop_nothing_and_the_log_no_messa
                 log.record(channel, time.monotonic(), ODOMETRY if channel == "odometry" else {"step": i})
                 costs.append(time.perf_counter() - began)
             assert sum(costs) < 20.0
-            live.show([Seen(CAMERA, Frame(time.monotonic(), picture()))])
+            live.show([SeenImages(CAMERA, Frame(time.monotonic(), picture()))])
     kept = read_log(tmp_path / "flight.mcap")
     assert sum(map(len, kept.series.values())) == 3200
     assert outlet.sent + outlet.dropped == 3600
@@ -249,7 +249,7 @@ def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(
     other.subscribe("odometry")
     told = 0
     for i in range(1500):  # more than the sockets between them keep
-        live.show([Seen(CAMERA, Frame(time.monotonic(), picture(1 + i / 1500)))])
+        live.show([SeenImages(CAMERA, Frame(time.monotonic(), picture(1 + i / 1500)))])
         live.record("odometry", time.monotonic(), {**ODOMETRY, "age": float(i)})
         time.sleep(0.001)
     while told < 1499:

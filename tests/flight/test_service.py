@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from e2efly.flight.betaflight.allowed_modes import ARM, OVERRIDE
-from e2efly.flight.betaflight.codec import REPLY, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, MspFrame, encode
 from e2efly.flight.betaflight.messages import SET_RAW_RC, StatusEx
 from e2efly.flight.betaflight.mode_slots import BoxIds
 from e2efly.flight.flight_loop import fly
@@ -153,12 +153,12 @@ class Flying:
     def __call__(self, code: int) -> bytes:
         self.asked.add(code)
         if code == BoxIds.CODE:
-            return encode(Frame(code, bytes(self._ids), REPLY))
+            return encode(MspFrame(code, bytes(self._ids), REPLY))
         if code != StatusEx.CODE:
             return recorded(code)
         status = bytearray(payload(REPLIES[1][StatusEx.CODE]))
         status[6:10] = sum(1 << self._ids.index(box) for box in self.boxes).to_bytes(4, "little")
-        return encode(Frame(code, bytes(status), REPLY))
+        return encode(MspFrame(code, bytes(status), REPLY))
 
 
 def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:

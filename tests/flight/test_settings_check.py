@@ -15,7 +15,7 @@ from e2efly.commands.fly_check import add_lags, mount, print_settings, print_tab
 from e2efly.flight.betaflight import messages, settings_by_name
 from e2efly.flight.betaflight.allowed_modes import ANGLE
 from e2efly.flight.betaflight.client import MESSAGES, Client
-from e2efly.flight.betaflight.codec import ERROR, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import ERROR, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.mode_slots import ModeRange
@@ -52,12 +52,12 @@ class Wire:
     def send(self, data: bytes) -> None:
         self.pending += b"".join(self.reply(frame) for frame in self.decoder.feed(data))
 
-    def reply(self, frame: Frame) -> bytes:
+    def reply(self, frame: MspFrame) -> bytes:
         if frame.code != settings_by_name.CODE:
             return bytes.fromhex(self.replies[str(frame.code)])
         key = f"{frame.code} {messages.text(frame.payload)}"
         if key not in self.replies:
-            return encode(Frame(frame.code, direction=ERROR, version=2))
+            return encode(MspFrame(frame.code, direction=ERROR, version=2))
         return bytes.fromhex(self.replies[key])
 
     def receive(self) -> bytes:

@@ -8,7 +8,7 @@ import pytest
 
 import e2efly
 from e2efly.flight.sight.image_source import Frame
-from e2efly.flight.sight.quality import FROZEN, WRONG, Seen, see
+from e2efly.flight.sight.quality import FROZEN, WRONG, SeenImages, see
 from e2efly.policy.odometry import Odometry
 
 CAMERA = e2efly.load_policy("avoid").contract.images[0]
@@ -34,7 +34,7 @@ def ground(height: float, pitch: float = 0.0) -> np.ndarray:
 
 
 def test_fresh_changing_images_are_flown_by_until_they_are_old() -> None:
-    seen = Seen(CAMERA)
+    seen = SeenImages(CAMERA)
     assert seen.problem(0.0) == "image 'image_0': none came yet"
     for k in range(5):
         seen = see(seen, [Frame(0.03 * k, image())], 0.03 * k + 0.01)
@@ -60,7 +60,7 @@ def test_fresh_changing_images_are_flown_by_until_they_are_old() -> None:
     ],
 )
 def test_an_image_that_cannot_be_believed_is_named_at_once_and_forgiven_later(frame: Frame, said: str) -> None:
-    seen = see(Seen(CAMERA), [Frame(0.0, image())], 0.0)
+    seen = see(SeenImages(CAMERA), [Frame(0.0, image())], 0.0)
     bad = see(seen, [frame], 0.1)
     problem = bad.problem(0.1)
     assert problem is not None
@@ -71,7 +71,7 @@ def test_an_image_that_cannot_be_believed_is_named_at_once_and_forgiven_later(fr
 
 def test_frozen_images_are_found_but_not_an_empty_sky() -> None:
     still, sky = image(), np.full(CAMERA.shape, 10.0, np.float32)
-    seen, open_sky = Seen(CAMERA), Seen(CAMERA)
+    seen, open_sky = SeenImages(CAMERA), SeenImages(CAMERA)
     for k in range(FROZEN):
         assert k == 0 or seen.problem(0.03 * k) is None
         seen = see(seen, [Frame(0.03 * k, still)], 0.03 * k)
@@ -80,7 +80,7 @@ def test_frozen_images_are_found_but_not_an_empty_sky() -> None:
     assert seen.problem(now) == f"image 'image_0': frozen: {FROZEN} equal images in a row"
     assert open_sky.problem(now) is None
     mask = dataclasses.replace(CAMERA, sees="mask", of="pad", encoding="none")
-    away = Seen(mask)
+    away = SeenImages(mask)
     for k in range(10):  # a mask without its object is always the same
         away = see(away, [Frame(0.03 * k, np.zeros(mask.shape, np.float32))], 0.03 * k)
     assert away.problem(0.27) is None
@@ -89,7 +89,7 @@ def test_frozen_images_are_found_but_not_an_empty_sky() -> None:
 @pytest.mark.parametrize("pitch", [0.0, 0.2, -0.2])
 @pytest.mark.parametrize("height", [0.8, 1.5])
 def test_a_camera_that_hangs_upside_down_sees_farther_than_the_ground(height: float, pitch: float) -> None:
-    right, wrong, near = Seen(CAMERA), Seen(CAMERA), Seen(CAMERA)
+    right, wrong, near = SeenImages(CAMERA), SeenImages(CAMERA), SeenImages(CAMERA)
     for k in range(WRONG):
         noise = (1 + 0.01 * RNG.standard_normal(CAMERA.shape)).astype(np.float32)
         picture = np.clip(ground(height, pitch) * noise, 0, 10)
@@ -105,7 +105,7 @@ def test_a_camera_that_hangs_upside_down_sees_farther_than_the_ground(height: fl
     # nothing is said by a vehicle that turns, that is on the ground, or whose pose is not known
     spinning = dataclasses.replace(level(height), body_rate=np.array([3.0, 0, 0]))
     for pose in (None, spinning, level(0.05)):
-        quiet = Seen(CAMERA)
+        quiet = SeenImages(CAMERA)
         for k in range(WRONG):
             quiet = see(quiet, [Frame(0.03 * k, (1 - 0.001 * k) * ground(height)[::-1])], 0.03 * k, pose)
         assert quiet.problem(0.03 * (WRONG - 1)) is None

@@ -24,15 +24,15 @@ import pytest
 
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.betaflight import watchdog
-from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
-from e2efly.flight.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, Plan, WatchedLink, descent
+from e2efly.flight.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, DescentPlan, WatchedLink, descent
 from tests.faults.virtual_watchdog import VirtualWatchdog
 from tests.waiting import running, until
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
 PULSES = tuple(1500 + round(100 * rate) for rate in RATES)
-PLAN = Plan(
+PLAN = DescentPlan(
     flying=True,
     rates=RATES,
     pulses=(PULSES, PULSES, tuple(reversed(PULSES))),
@@ -122,7 +122,7 @@ class Controller:
         """When they came, and the channels."""
         self.attitude: tuple[float, float] | None = (20.0, -10.0)
         """Roll and pitch, deg; None: it does not answer."""
-        self.others: list[Frame] = []
+        self.others: list[MspFrame] = []
         self.drop = threading.Event()
         self.accepted = 0
         self._stop, self._wake = os.pipe()
@@ -167,16 +167,16 @@ class Controller:
         if peer is not None:
             peer.close()
 
-    def _answer(self, peer: socket.socket, frame: Frame) -> None:
+    def _answer(self, peer: socket.socket, frame: MspFrame) -> None:
         now = time.monotonic()
         if frame.code == SET_RAW_RC:
             self.sticks.append((now, struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload)))
         elif frame.code == AttitudeReply.CODE and self.attitude is not None:
             roll, pitch = self.attitude
-            peer.sendall(encode(Frame(frame.code, struct.pack("<3h", int(10 * roll), int(10 * pitch), 0), REPLY)))
+            peer.sendall(encode(MspFrame(frame.code, struct.pack("<3h", int(10 * roll), int(10 * pitch), 0), REPLY)))
         elif frame.code != AttitudeReply.CODE:
             self.others.append(frame)
-            peer.sendall(encode(Frame(frame.code, frame.payload, REPLY, frame.version)))
+            peer.sendall(encode(MspFrame(frame.code, frame.payload, REPLY, frame.version)))
 
 
 @pytest.fixture
@@ -208,7 +208,7 @@ sys.stdin.read()
 class Flying:
     """A bridge in a process of its own, and the watchdog that it has started."""
 
-    def __init__(self, controller: Controller, plan: Plan = PLAN, stderr: int | None = None) -> None:
+    def __init__(self, controller: Controller, plan: DescentPlan = PLAN, stderr: int | None = None) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-c", BRIDGE, controller.target, json.dumps(STEADY), json.dumps(asdict(plan))],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True,
@@ -227,7 +227,7 @@ class Flying:
 def fly(controller: Controller) -> Iterator[Callable[..., Flying]]:
     flights: list[Flying] = []
 
-    def begin(plan: Plan = PLAN, stderr: int | None = None) -> Flying:
+    def begin(plan: DescentPlan = PLAN, stderr: int | None = None) -> Flying:
         flights.append(Flying(controller, plan, stderr))
         until(lambda: controller.count() > 20)
         return flights[-1]
@@ -258,7 +258,7 @@ def test_bytes_are_handed_through_both_ways_and_the_end_on_the_ground_is_silent(
     assert not link.alive and link.reason
     until(lambda: link.poll(0.0) or link.alive)
     assert link.connections == 1 and link.reason == ""
-    every = encode(Frame(77, bytes(range(256)) * 3, version=2))
+    every = encode(MspFrame(77, bytes(range(256)) * 3, version=2))
     decoder, got = Decoder(), []
     for _ in range(20):
         link.send(every)
@@ -460,7 +460,7 @@ class Told:
                 self.sticks.append(struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload))
             elif frame.code == StatusEx.CODE and (armed := self.armed(self.now)) is not None:
                 payload = struct.pack("<HHHIBHBBBBIB", 250, 0, 0, int(armed), 0, 0, 4, 0, 0, 29, 0, 0)
-                self.pending += encode(Frame(StatusEx.CODE, payload, REPLY))
+                self.pending += encode(MspFrame(StatusEx.CODE, payload, REPLY))
 
     def receive(self) -> bytes:
         data, self.pending = self.pending, b""

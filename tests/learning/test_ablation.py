@@ -9,7 +9,7 @@ import pytest
 
 from e2efly.commands.cli import run
 from e2efly.config import TrainConfig
-from e2efly.learning.ablation import FULL, Kept, ablate
+from e2efly.learning.ablation import FULL, KeptRun, ablate
 from e2efly.learning.runner import train
 from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory
@@ -50,7 +50,7 @@ def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path, monkeypa
 @pytest.mark.whole
 def test_members_differ_and_an_ablation_that_was_stopped_ends_bit_for_bit_like_one_that_was_not(tmp_path: Path) -> None:
     config, path, shares = small("bptt"), tmp_path / "kept.safetensors", []
-    kept = Kept(path, {"seeds": 2, "steps": config.steps}, period=0.0)
+    kept = KeptRun(path, {"seeds": 2, "steps": config.steps}, period=0.0)
 
     def told(share: float, success: float) -> None:
         shares.append(share)

@@ -14,7 +14,7 @@ from e2efly.environment import Step, random_key
 from e2efly.learning.algorithm import TrainState, make_algorithm
 from e2efly.learning.devices import OWN, on_each, own, stacked
 from e2efly.learning.networks import Actor
-from e2efly.learning.ppo import Samples, in_pieces, log_prob, means
+from e2efly.learning.ppo import PPOSamples, in_pieces, log_prob, means
 from e2efly.learning.setup import Setup
 from tests.learning.probe import Probe, ProbeState
 
@@ -97,7 +97,7 @@ def test_the_pieces_act_as_the_rollout_did_and_the_gradient_goes_back_to_their_f
     env, observation = setup.env.reset(random_key(0), 8)
     state = TrainState(parameters, None, env, observation, setup.actor.memory(8), random_key(0))
 
-    def flown(state: TrainState) -> Samples:
+    def flown(state: TrainState) -> PPOSamples:
         rollout = setup.algorithm._rollout  # type: ignore[attr-defined]
         return stacked(rollout(setup.env, config.algo, own(state), random_key(1))[0])
 

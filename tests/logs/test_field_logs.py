@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.alignment.checks import checked
 from e2efly.alignment.identification import driver_of
-from e2efly.logs.bag_storage import Topic
+from e2efly.logs.bag_storage import BagTopic
 from e2efly.logs.csv_file import column_map, read_csv
-from e2efly.logs.readers import FORMATS, Reading, read_flights
+from e2efly.logs.readers import FORMATS, LogReading, read_flights
 from e2efly.logs.recording import Record, Stream, percent
 from e2efly.logs.ros_bag import _store_of
 from e2efly.vehicles.loading import load_vehicle
@@ -36,7 +36,7 @@ def test_a_log_is_recognised_by_its_content_whatever_its_name(tmp_path: Path, na
 
 
 def read(path: Path, **options: Any) -> Record:
-    (found,) = read_flights(path, Reading(**options))
+    (found,) = read_flights(path, LogReading(**options))
     return found
 
 
@@ -134,7 +134,7 @@ def test_commands_without_a_thrust_drive_the_fit_of_the_rates_alone(tmp_path: Pa
 def test_messages_of_px4_are_what_its_logs_are(tmp_path: Path, storage: str, monkeypatch: pytest.MonkeyPatch) -> None:
     kind = "px4_msgs/msg/ActuatorMotors"
     text = "uint64 timestamp\nuint64 timestamp_sample\nuint16 reversible_flags\nfloat32[12] control\n"
-    store = _store_of(Topic("", kind, 2, text))
+    store = _store_of(BagTopic("", kind, 2, text))
     monkeypatch.setattr("tests.logs.log_samples._store", lambda version: store)
     control = {"timestamp": 5_000_000, "control": [0.1, 0.2, 0.3, 0.4, *[math.nan] * 8]}
     path = bag(tmp_path / "b", (("/fmu/out/actuator_motors", "px4_msgs/ActuatorMotors", control),), 1, storage)
@@ -226,7 +226,7 @@ def test_a_remedy_that_is_named_can_be_done_in_every_format(tmp_path: Path) -> N
     assert "az of specific_force are changed, as --columns asks" in found.notes
     assert "specific_force" not in read(path, without=("specific_force",)).streams
     with pytest.raises(ValueError, match="--without: unknown stream 'force'"):
-        Reading(without=("force",))
+        LogReading(without=("force",))
 
 
 @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])

@@ -24,7 +24,7 @@ from e2efly.policy.goal import Shape
 from e2efly.policy.loader import load_policy
 from e2efly.runs import presets
 from e2efly.tasks.race import RaceConfig
-from e2efly.tasks.race.any_goal import Memory
+from e2efly.tasks.race.any_goal import AnyRaceMemory
 from e2efly.tasks.race.any_world import AnyRace
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import course_for, fields_of
@@ -159,7 +159,7 @@ def test_the_policy_is_shown_the_next_three_gates() -> None:
     goal = task("s_shaped")
     body = at_rest(jnp.asarray([[1.0, 2.0, 7.0]]))
     for made, passed, gates in ((tracks, 1, [1, 2, 3]), (tracks, 3, [3, 3, 3]), (closed, 7, [3, 0, 1])):
-        seen = np.asarray(goal.observe(Memory(made, np.array([passed])), jnp.zeros(1), body))[0]
+        seen = np.asarray(goal.observe(AnyRaceMemory(made, np.array([passed])), jnp.zeros(1), body))[0]
         centre, axis, opening = seen[:9].reshape(3, 3), seen[9:18].reshape(3, 3), seen[18:24]
         g = made.gates
         onward = np.array([0, 1, 2])[:, None] if gates == [3, 3, 3] else 0.0
@@ -178,9 +178,9 @@ def test_nothing_tells_where_the_track_stands_or_which_gate_it_is() -> None:
     moved = dataclasses.replace(tracks.gates, position=tracks.gates.position + far)
     body = at_rest(jnp.asarray(shift(tracks, 0, -1.0)))
     there = dataclasses.replace(body, position=body.position + far)
-    memory = Memory(tracks, np.zeros(20, int))
+    memory = AnyRaceMemory(tracks, np.zeros(20, int))
     seen = race.observe(memory, jnp.zeros(20), body)
-    again = race.observe(Memory(dataclasses.replace(tracks, gates=moved), tracks.count), jnp.zeros(20), there)
+    again = race.observe(AnyRaceMemory(dataclasses.replace(tracks, gates=moved), tracks.count), jnp.zeros(20), there)
     np.testing.assert_allclose(np.asarray(seen)[tracks.closed], np.asarray(again)[tracks.closed], atol=1e-4)
 
 

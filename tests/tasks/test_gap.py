@@ -15,7 +15,7 @@ from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler, multiply, rotate, unrotate
 from e2efly.simulation.scenes.scene import WALL, clearance
 from e2efly.tasks.gap import GapConfig
-from e2efly.tasks.gap.goal import Memory
+from e2efly.tasks.gap.goal import GapMemory
 from e2efly.tasks.gap.world import Gap
 from e2efly.tasks.task import Outcome, Shape, at_rest
 
@@ -30,12 +30,12 @@ def make(**changes: Any) -> Gap:
     return Gap.of(GapConfig(**changes), SHAPE, PERIOD, 7)
 
 
-def slit(roll: float, yaw: float = 0.0, passed: bool = False) -> Memory:
+def slit(roll: float, yaw: float = 0.0, passed: bool = False) -> GapMemory:
     turn = from_euler(jnp.array([roll]), jnp.zeros(1), jnp.array([yaw]))
-    return Memory(jnp.array([[3.0, 0.0, 2.0]]), turn, jnp.array([passed]))
+    return GapMemory(jnp.array([[3.0, 0.0, 2.0]]), turn, jnp.array([passed]))
 
 
-def at(memory: Memory, place: Any, roll: float, pitch: float = 0.0, yaw: float = 0.0) -> State:
+def at(memory: GapMemory, place: Any, roll: float, pitch: float = 0.0, yaw: float = 0.0) -> State:
     """At a place of the slit's frame, attitude relative to the upright wall, flying through at 3 m/s."""
     place = jnp.asarray([place], jnp.float32)
     wall = jnp.arctan2(*(2 * rotate(memory.quaternion, jnp.array([[1.0, 0, 0]]))[:, i] for i in (1, 0)))
@@ -49,10 +49,10 @@ def at(memory: Memory, place: Any, roll: float, pitch: float = 0.0, yaw: float =
 
 
 @jax.jit
-def flight(task: Gap, memory: Memory, first: State) -> tuple[Memory, Outcome]:
+def flight(task: Gap, memory: GapMemory, first: State) -> tuple[GapMemory, Outcome]:
     """Ten steps straight on."""
 
-    def step(carry: tuple[Memory, State], i: Any) -> tuple[tuple[Memory, State], Outcome]:
+    def step(carry: tuple[GapMemory, State], i: Any) -> tuple[tuple[GapMemory, State], Outcome]:
         memory, before = carry
         after = dataclasses.replace(before, position=before.position + PERIOD * before.velocity)
         memory, out = task.advance(memory, before, after, (i + 1) * jnp.full(1, PERIOD), LATER)

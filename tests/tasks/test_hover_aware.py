@@ -18,7 +18,7 @@ from e2efly.simulation.physics.rotation import from_euler, normalize
 from e2efly.simulation.scenes.camera import look, mount
 from e2efly.simulation.scenes.scene import OBSTACLE
 from e2efly.tasks.hover_aware import HoverAwareConfig
-from e2efly.tasks.hover_aware.goal import OUTSIDE, Memory
+from e2efly.tasks.hover_aware.goal import OUTSIDE, HoverAwareMemory
 from e2efly.tasks.hover_aware.world import HoverAware
 from e2efly.tasks.task import Shape, at_rest
 
@@ -35,12 +35,12 @@ def make(**changes: Any) -> HoverAware:
     return HoverAware(HoverAwareConfig(**changes), SHAPE, PERIOD)
 
 
-def ball(place: Any, rate: float = 0.0, held: float = 0.0) -> Memory:
+def ball(place: Any, rate: float = 0.0, held: float = 0.0) -> HoverAwareMemory:
     """What to look at, at (x, y, z) from the world's origin, and turning about it."""
     x, y, z = (jnp.array([v], jnp.float32) for v in place)
     away, angle = jnp.hypot(x, y), jnp.arctan2(y, x)
     centre = jnp.stack([0 * x, 0 * x, z], axis=-1)
-    return Memory(centre, away, angle, jnp.array([rate]), jnp.zeros(1), jnp.array([held]))
+    return HoverAwareMemory(centre, away, angle, jnp.array([rate]), jnp.zeros(1), jnp.array([held]))
 
 
 def turned(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> jax.Array:
@@ -111,7 +111,7 @@ def test_the_pixels_velocity_against_differences() -> None:
     np.testing.assert_allclose(velocity, (ends[0] - ends[1]) / (2 * h), rtol=1e-6)
 
 
-def signals(task: HoverAware, memory: Memory, state: State) -> dict[str, jax.Array]:
+def signals(task: HoverAware, memory: HoverAwareMemory, state: State) -> dict[str, jax.Array]:
     return advance(task, memory, state, state, jnp.zeros(1), LATER)[1].signals
 
 

@@ -19,7 +19,7 @@ from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.world import World, _path
+from e2efly.tasks.race_clutter.world import ClutterWorld, _path
 from e2efly.tasks.task import Outcome, Shape, at_rest, make_task, struck
 
 SHAPE = Shape(0.05, 0.15)
@@ -160,7 +160,7 @@ def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
         seen = []
         for task, tracks in ((alone, own), (among, wide)):
             tracks = jax.tree.map(jnp.asarray, tracks)
-            memory = World(tracks, jnp.array([passed]), jnp.array([6.0]), {})
+            memory = ClutterWorld(tracks, jnp.array([passed]), jnp.array([6.0]), {})
             seen.append(np.asarray(task.observe(memory, jnp.zeros(1), place)))
             assert np.asarray(task.scene(memory).solids["gate"].active).sum() == count
         np.testing.assert_array_equal(*seen)

@@ -17,7 +17,7 @@ import e2efly
 from e2efly.commands.cli import run
 from e2efly.control import Quat
 from e2efly.validation.airsim import frames, protocol, vehicle_model
-from e2efly.validation.airsim.lockstep import Session
+from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.airsim.rpc import Rpc, RpcError
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants import find_plant
@@ -123,7 +123,7 @@ def test_every_request_is_byte_for_byte_that_of_the_published_client(server: Ser
         future.join()
         client.simContinueForTime(0.05)
 
-    session = Session(connect(ours.port), DRONE)
+    session = AirSimSession(connect(ours.port), DRONE)
     session.place(state)
     session.state()
     session.set_gains(np.array([0.03, 0.04, 0.08]))
@@ -187,7 +187,7 @@ def test_the_server_refuses_what_rpclib_refuses(server: Server, connect: Any) ->
 
 
 def test_lockstep_keeps_time_though_the_simulator_ends_early_or_late(server: Server, connect: Any) -> None:
-    session = Session(connect(server.port))
+    session = AirSimSession(connect(server.port))
     assert session.step == pytest.approx(PERIOD, abs=1e-6)
     began, worst = session._now(), 0.0
     for k in range(60):
@@ -203,7 +203,7 @@ def test_lockstep_keeps_time_though_the_simulator_ends_early_or_late(server: Ser
 
 def test_a_command_acts_from_the_first_physics_step_on(server: Server, connect: Any) -> None:
     """The method blocks in a pause: a client that only sent it and let time pass would race it."""
-    session = Session(connect(server.port))
+    session = AirSimSession(connect(server.port))
     for k in range(20):
         rates = np.array([0.1 * k, 0.2, -0.3])
         session.command(rates, 0.3)
@@ -299,7 +299,7 @@ def test_a_server_that_talks_nonsense_is_named(reply: Callable[[list[Any]], byte
     served = answering(reply)
     port = served.server_address[1]
     with pytest.raises((OSError, ValueError), match=f"airsim:127.0.0.1:{port}: .*{told}"):
-        Session(connect(port, timeout=0.2))
+        AirSimSession(connect(port, timeout=0.2))
     served.shutdown()
     served.server_close()
 
@@ -328,17 +328,17 @@ def test_addresses() -> None:
 def test_a_clock_that_runs_in_a_pause_is_named(server: Server, connect: Any) -> None:
     server.world.now = lambda: int(1e9 * __import__("time").time())  # type: ignore[method-assign]
     with pytest.raises(RpcError, match="the clock runs in a pause; accepted: ClockType SteppableClock"):
-        Session(connect(server.port))
+        AirSimSession(connect(server.port))
 
 
 def test_a_clock_that_stands_is_named(server: Server, connect: Any) -> None:
     server.world.go_on = lambda seconds: None  # type: ignore[method-assign]
     with pytest.raises(RpcError, match="the simulator's clock does not go on"):
-        Session(connect(server.port))
+        AirSimSession(connect(server.port))
 
 
 def test_a_state_that_is_none_is_named(server: Server, connect: Any) -> None:
-    session = Session(connect(server.port))
+    session = AirSimSession(connect(server.port))
     truth = server.world.kinematics()
     for change, told in (({"position": {}}, "position.x_val is None"), ({"orientation": None}, "orientation.w_val")):
         server.world.kinematics = lambda change=change: {**truth, **change}  # type: ignore[method-assign]

@@ -20,11 +20,11 @@ from e2efly.policy.zoo import policy_file
 from e2efly.simulation.sensors.eyes import Eye
 from e2efly.validation.airsim.airsim_camera import camera_of, opened, taken
 from e2efly.validation.airsim.airsim_images import DEPTH_PERSPECTIVE, DEPTH_PLANAR, SCENE, SEGMENTATION, fields_of_view
-from e2efly.validation.airsim.lockstep import Session
+from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.airsim.rpc import Rpc, RpcError
 from e2efly.validation.airsim.settings_file import settings, unsaid
 from e2efly.validation.evaluation import SEED, candidate
-from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import RigidState, Shutter
 from e2efly.validation.plant_sight import Sight
 from e2efly.validation.plants import find_plant
@@ -58,12 +58,12 @@ def pad() -> Sight:
 
 
 @pytest.fixture
-def connect() -> Iterator[Callable[[Server], Session]]:
+def connect() -> Iterator[Callable[[Server], AirSimSession]]:
     """Makes sessions, and ends them."""
-    made: list[Session] = []
+    made: list[AirSimSession] = []
 
-    def connected(server: Server) -> Session:
-        made.append(Session(Rpc("127.0.0.1", server.port), DRONE))
+    def connected(server: Server) -> AirSimSession:
+        made.append(AirSimSession(Rpc("127.0.0.1", server.port), DRONE))
         return made[-1]
 
     yield connected
@@ -84,7 +84,7 @@ def of(image: Image, **changes: Any) -> Image:
     return dataclasses.replace(image, **none, **changes)
 
 
-def hovering(session: Session, height: float = 2.0) -> RigidState:
+def hovering(session: AirSimSession, height: float = 2.0) -> RigidState:
     """Placed over the pad, level."""
     state = RigidState(np.array([0.1, -0.2, height]), np.zeros(3), np.eye(4)[0], np.zeros(3))
     session.begin(state)
@@ -99,7 +99,7 @@ def test_requests_are_byte_for_byte_those_of_the_published_client(
     kinds[SEGMENTATION] = "Segmentation"
     with served(vis_r, landing.images, pad, kinds=kinds) as server:
         theirs, ours = Tap(server.port), Tap(server.port)
-        session = Session(Rpc("127.0.0.1", ours.port), DRONE)
+        session = AirSimSession(Rpc("127.0.0.1", ours.port), DRONE)
         with published(theirs.port) as client:
             for kind, name in kinds.items():
                 floats = name.startswith("Depth")
@@ -118,7 +118,7 @@ def test_requests_to_airsim_itself_have_its_own_parameters(vis_r: Vehicle, landi
     """No published client of AirSim 1.8.1 can be installed: by its source, one parameter more and one field less."""
     with served(vis_r, landing.images, pad, version=1) as server:
         tap = Tap(server.port)
-        session = Session(Rpc("127.0.0.1", tap.port), DRONE)
+        session = AirSimSession(Rpc("127.0.0.1", tap.port), DRONE)
         session.picture("image_0", SEGMENTATION)
         session.field_of_view("image_0")
         request = {"camera_name": "image_0", "image_type": 5, "pixels_as_float": False, "compress": False}
@@ -250,8 +250,8 @@ def test_a_policy_lands_by_airsims_own_images(
         env = found.environment(suite)
         starts = draw_starts(env, 1, SEED)
         plant, own = f"airsim:127.0.0.1:{server.port}", {"image_0": "image_0:1,2,3"}  # the colour of nothing
-        mission = Mission(found.file, plant, vis_r, vis_r, float(suite.episode_s), own)
-        flight = Flight(starts.states[0], starts.courses[0], Reality(vis_r, found.latency), pad)
+        mission = FleetMission(found.file, plant, vis_r, vis_r, float(suite.episode_s), own)
+        flight = FleetFlight(starts.states[0], starts.courses[0], Reality(vis_r, found.latency), pad)
         (blind,) = fly_all(mission, [flight])
         assert not blind.success
 
@@ -345,7 +345,7 @@ def test_a_camera_that_is_not_the_contracts_is_named(
         with pytest.raises(
             ValueError, match=r"simGetCameraInfo says a field of view of 80 degrees, and .* is 90; accept"
         ):
-            opened(Session(session.rpc, DRONE), camera_of(f"image_0:{PAD}", image))
+            opened(AirSimSession(session.rpc, DRONE), camera_of(f"image_0:{PAD}", image))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.commands.firmware import Firmware, run
+from e2efly.commands.firmware import FirmwareOptions, run
 from e2efly.validation import binary, firmware_program
 
 
@@ -23,24 +23,24 @@ def test_it_is_flown_until_the_packaged_one_is_chosen_again(cache: Path, capsys:
     mine = cache / "my_SITL"
     mine.write_bytes(firmware_program.build().program.read_bytes())
     mine.chmod(0o755)
-    assert run(Firmware(binary=mine)) == 0
+    assert run(FirmwareOptions(binary=mine)) == 0
     assert "Betaflight 4.6, MSP 1.47. An override that MSP has left is held" in capsys.readouterr().out
     kept = firmware_program.chosen()
     assert (kept.program, kept.release) == (binary.keep(mine).program, firmware_program.PACKAGED)
     assert kept.program.read_bytes() == mine.read_bytes() and kept.program != firmware_program.build().program
     mine.unlink()  # what is flown does not hang on where it was built
     assert firmware_program.chosen() == kept
-    assert run(Firmware()) == 0
+    assert run(FirmwareOptions()) == 0
     assert firmware_program.chosen() == firmware_program.build()
 
 
 def test_what_is_no_firmware_is_refused_and_the_choice_stays(cache: Path) -> None:
     with pytest.raises(ValueError, match=r"--binary is .*/none; accepted: a program"):
-        run(Firmware(binary=cache / "none"))
+        run(FirmwareOptions(binary=cache / "none"))
     with pytest.raises(OSError, match="does not start"):
-        run(Firmware(binary=Path("/bin/true")))
+        run(FirmwareOptions(binary=Path("/bin/true")))
     with pytest.raises(ValueError, match="--archive and --binary are both given"):
-        run(Firmware(cache / "a.tar.gz", Path("/bin/true")))
+        run(FirmwareOptions(cache / "a.tar.gz", Path("/bin/true")))
     assert firmware_program.chosen() == firmware_program.build()
 
 

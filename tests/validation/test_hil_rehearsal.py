@@ -14,17 +14,17 @@ from e2efly.courses.tracks import load_track, track_text
 from e2efly.flight.pose.json_source import parse_pose
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.validation.evaluation import candidate
-from e2efly.validation.hil_lap import Change, Lap, Spread, Truth, verdict
-from e2efly.validation.link_process import Line
-from e2efly.validation.mocap_process import ATTITUDE, POSITION, Camera, Marks
+from e2efly.validation.hil_lap import Lap, SceneChange, Spread, Truth, verdict
+from e2efly.validation.link_process import DelayLine
+from e2efly.validation.mocap_process import ATTITUDE, POSITION, Marks, MocapCamera
 from e2efly.validation.processes import Program, flags
-from e2efly.validation.rehearse_hil import LOOP_S, Drawn, Plan, draw, unlike
+from e2efly.validation.rehearse_hil import LOOP_S, Drawn, RehearsalPlan, draw, unlike
 
 POSE = {"position": [1.0, 2.0, 3.0], "quaternion": [0.6, 0.0, 0.8, 0.0], "velocity": [0, 0, 0], "stamp": 5.0}
 
 
 def test_motion_capture_is_late_and_noisy_and_tells_no_velocity() -> None:
-    camera = Camera(Marks(delay=0.004, gaps=0.0), np.random.default_rng(0))
+    camera = MocapCamera(Marks(delay=0.004, gaps=0.0), np.random.default_rng(0))
     for k in range(400):
         camera.see({**POSE, "stamp": 0.005 * k}, now=0.005 * k)
     assert len(camera.ready(2.0)) == 400
@@ -46,7 +46,7 @@ def test_motion_capture_is_late_and_noisy_and_tells_no_velocity() -> None:
 
 
 def test_hidden_markers_deliver_nothing_for_a_moment() -> None:
-    camera = Camera(Marks(gaps=2.0), np.random.default_rng(0))
+    camera = MocapCamera(Marks(gaps=2.0), np.random.default_rng(0))
     seen = 0
     for k in range(4000):
         camera.see(POSE, now=0.005 * k)
@@ -56,7 +56,7 @@ def test_hidden_markers_deliver_nothing_for_a_moment() -> None:
 
 
 def test_a_radio_delivers_late_and_in_order() -> None:
-    line = Line(0.05)
+    line = DelayLine(0.05)
     line.send(b"first ", now=1.0)
     line.send(b"second", now=1.01)
     assert line.arrived(1.0499) == b""
@@ -68,9 +68,9 @@ def test_a_radio_delivers_late_and_in_order() -> None:
 
 def test_the_radio_of_a_rehearsal_has_what_the_loop_leaves_of_the_latency() -> None:
     by_radio, on_board = (candidate("race_clutter", vehicle) for vehicle in ("vis_h", "vis_r"))
-    assert Plan(by_radio).radio == pytest.approx(0.09 - LOOP_S)
-    assert Plan(on_board).radio == pytest.approx(0.06 - LOOP_S)
-    assert Plan(by_radio, link_delay=0.0).radio == 0.0
+    assert RehearsalPlan(by_radio).radio == pytest.approx(0.09 - LOOP_S)
+    assert RehearsalPlan(on_board).radio == pytest.approx(0.06 - LOOP_S)
+    assert RehearsalPlan(by_radio, link_delay=0.0).radio == 0.0
 
 
 def test_options_of_a_command_are_those_that_differ() -> None:
@@ -92,13 +92,13 @@ def test_a_track_is_written_as_it_is_read(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def race(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Drawn]:
-    plan = Plan(candidate("race_clutter"), Origin((2.0, -1.0, 0.0), 0.3))
+def race(tmp_path_factory: pytest.TempPathFactory) -> tuple[RehearsalPlan, Drawn]:
+    plan = RehearsalPlan(candidate("race_clutter"), Origin((2.0, -1.0, 0.0), 0.3))
     return plan, draw(plan, 4, tmp_path_factory.mktemp("drawn") / "track.toml")
 
 
 @pytest.mark.whole
-def test_the_bridge_is_told_the_gates_that_stand_in_the_world(race: tuple[Plan, Drawn]) -> None:
+def test_the_bridge_is_told_the_gates_that_stand_in_the_world(race: tuple[RehearsalPlan, Drawn]) -> None:
     _, drawn = race
     own, wanted = drawn.course.memory, drawn.scenery.course.memory
     own_track, track = own.tracks.track(0), wanted.tracks.track(0)
@@ -127,7 +127,7 @@ def through_gates(drawn: Drawn, aside: float = 0.0) -> Truth:
     return Truth(time, points, np.gradient(points, time, axis=0), still, 0 * time)
 
 
-def test_the_truth_is_judged_in_the_scene(race: tuple[Plan, Drawn]) -> None:
+def test_the_truth_is_judged_in_the_scene(race: tuple[RehearsalPlan, Drawn]) -> None:
     plan, drawn = race
     asked = drawn.course, drawn.scenery
     good = verdict(*asked, through_gates(drawn), 100.0, plan.period, 1e-6)
@@ -140,8 +140,8 @@ def test_the_truth_is_judged_in_the_scene(race: tuple[Plan, Drawn]) -> None:
 
 
 def test_what_is_unlike_the_documented_end_is_told() -> None:
-    stale = Change(11.0, "hover", ("policy: image 'image_0': is 134 ms old; accepted: at most 133 ms",))
-    whole = Lap(0, "hil", changes=(Change(10.0, "policy", ()), stale), window=(10.0, 11.0), touch_sink=0.6)
+    stale = SceneChange(11.0, "hover", ("policy: image 'image_0': is 134 ms old; accepted: at most 133 ms",))
+    whole = Lap(0, "hil", changes=(SceneChange(10.0, "policy", ()), stale), window=(10.0, 11.0), touch_sink=0.6)
     assert unlike(whole) == []
     assert unlike(dataclasses.replace(whole, kill="mocap"))[0].startswith("after the kill came hover (policy: image")
     assert unlike(dataclasses.replace(whole, changes=whole.changes[:1]))[0].startswith("after the kill the bridge")
@@ -171,6 +171,6 @@ def test_options_without_effect_are_refused(capsys: pytest.CaptureFixture[str]) 
         assert said in " ".join(capsys.readouterr().err.split()), given
 
 
-def test_a_report_is_json(race: tuple[Plan, Drawn]) -> None:
-    lap = Lap(3, changes=(Change(1.0, "policy", ("mission switch",)),), truth=through_gates(race[1]))
+def test_a_report_is_json(race: tuple[RehearsalPlan, Drawn]) -> None:
+    lap = Lap(3, changes=(SceneChange(1.0, "policy", ("mission switch",)),), truth=through_gates(race[1]))
     assert json.loads(json.dumps(lap.as_json()))["modes"] == [[1.0, "policy", ["mission switch"]]]

@@ -12,7 +12,7 @@ import pytest
 from e2efly.flight.sight.shared import place
 from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import candidate
-from e2efly.validation.rehearse_hil import Plan, rehearse
+from e2efly.validation.rehearse_hil import RehearsalPlan, rehearse
 
 PATIENT = (
     "--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5", "--flight.lateness", "0.2",
@@ -40,7 +40,7 @@ def left_behind(folder: Path, rehearses: int) -> list[str]:
 
 
 def test_a_whole_flight_by_sight(tmp_path: Path) -> None:
-    plan = Plan(candidate("land_visual"), options=PATIENT)
+    plan = RehearsalPlan(candidate("land_visual"), options=PATIENT)
     lap = rehearse(plan, 1, tmp_path / "flight")
     assert lap.problems == ()
     modes = [change.mode for change in lap.changes]

@@ -22,7 +22,7 @@ from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.plant import RigidState
-from e2efly.validation.rehearse_hil import Plan, draw
+from e2efly.validation.rehearse_hil import RehearsalPlan, draw
 from e2efly.validation.scene_files import SceneFile, beside, ground_of, load_world
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.virtual_world import STRUCK_S, Node
@@ -199,7 +199,7 @@ def test_a_floor_of_solids_is_ground_where_there_is_no_plane(tmp_path: Path, dra
 
 def test_a_rehearsal_flies_in_the_scene(tmp_path: Path) -> None:
     file = SceneFile(str(scan(tmp_path / "scan.stl")), unit=1.0, beside=True)
-    plan = Plan(candidate("avoid"), scene=file)
+    plan = RehearsalPlan(candidate("avoid"), scene=file)
     scenery = draw(plan, 3, tmp_path / "track.toml").scenery
     assert isinstance(scenery.scene, MeshScene)
     assert file.options == ["--scene", file.name, "--scene-unit", "1.0", "--beside"]

@@ -23,8 +23,8 @@ from e2efly.tasks.land.goal import LandRoute
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.goal import RaceGoal
 from e2efly.tasks.track import TrackConfig
-from e2efly.tasks.track.goal import Memory, TrackGoal
-from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.tasks.track.goal import TrackGoal, TrackMemory
+from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import fly
 from e2efly.validation.plants.mujoco import MujocoPlant
@@ -119,7 +119,7 @@ def test_a_race_ends_behind_its_last_gate_or_at_the_first_that_is_missed(
 
 def test_a_reference_that_is_over_is_held_until_the_time_is_out(policy_of: Callable[..., Path]) -> None:
     rows = np.array([[t, 0.2 * t, 0.0, 3.0] for t in (0.0, 0.5, 1.0)])
-    memory = Memory(through_points(rows), np.zeros(1), np.zeros(1))
+    memory = TrackMemory(through_points(rows), np.zeros(1), np.zeros(1))
     goal = Course(TrackGoal(TrackConfig(), SHAPE), memory, rows[0, 1:])
     runtime = Runtime.of(load_policy(policy_of("track")), goal, load_vehicle("vis_r"))
     flight = fly(runtime, MujocoPlant(load_vehicle("vis_r")), START, 6.0, 0.06)
@@ -157,10 +157,10 @@ def test_what_cannot_be_flown_is_refused(hover: Runtime, duration: float, latenc
 
 def test_processes_fly_what_one_process_flies(policy_of: Callable[..., Path]) -> None:
     vehicle = load_vehicle("vis_r")
-    mission = Mission(policy_of("hover"), "mujoco", vehicle, vehicle, 0.3)
+    mission = FleetMission(policy_of("hover"), "mujoco", vehicle, vehicle, 0.3)
     starts = [dataclasses.replace(START, velocity=np.array([0.1 * i, 0.0, 0.0])) for i in range(7)]
     home, told = Reality(vehicle, 0.06), list[int]()
-    flights = [Flight(start, GOAL, home) for start in starts]
+    flights = [FleetFlight(start, GOAL, home) for start in starts]
     alone, together = fly_all(mission, flights, processes=1), fly_all(mission, flights, told.append, processes=2)
     assert told == list(range(1, 8))
     for a, b in zip(alone, together, strict=True):

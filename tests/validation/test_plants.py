@@ -14,7 +14,7 @@ import pytest
 from e2efly.control import Vec3
 from e2efly.simulation.physics import Physics, State, step
 from e2efly.simulation.physics.mixer import Mixer
-from e2efly.validation.flight_controller import RateLoop, rotor_speed_of
+from e2efly.validation.flight_controller import PlainRateLoop, rotor_speed_of
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.mujoco import MujocoPlant, vehicle_xml
@@ -141,7 +141,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
     """Over commands of which many saturate."""
     from e2efly.simulation.physics.body import gyroscopic_torque
 
-    rng, mixer, law = np.random.default_rng(0), Mixer.of(vis_r, np.float64), RateLoop(vis_r)
+    rng, mixer, law = np.random.default_rng(0), Mixer.of(vis_r, np.float64), PlainRateLoop(vis_r)
     saturated = 0
     for _ in range(200):
         command = np.array([rng.uniform(0, 28), *rng.uniform(-15, 15, 3)])

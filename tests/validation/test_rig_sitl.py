@@ -15,7 +15,7 @@ from e2efly.flight.betaflight.messages import AttitudeReply, Rc, StatusEx, set_r
 from e2efly.flight.betaflight.sticks import Sticks, sticks_of
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
-from e2efly.validation.world import Body
+from e2efly.validation.world import FlownBody
 from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")
@@ -163,7 +163,7 @@ def test_the_firmware_tells_the_attitude_that_the_world_has(standing: Bench, rol
     r = np.array([math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0])
     w, x, y, z = q[0] * r[0], q[0] * r[1], q[2] * r[0], -q[2] * r[1]
     still = np.zeros(3)
-    rig.state = Body(np.array([0.0, 0.0, 1.0]), still, np.array([w, x, y, z]), still, np.zeros(4))
+    rig.state = FlownBody(np.array([0.0, 0.0, 1.0]), still, np.array([w, x, y, z]), still, np.zeros(4))
     rig.held = True
     standing.send(3.0, None)
     attitude = standing.said(AttitudeReply)

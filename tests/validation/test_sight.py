@@ -15,7 +15,7 @@ from e2efly.environment.stress_rows import ALL, ROWS
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.validation.evaluation import SEED, candidate
 from e2efly.validation.plant import RigidState
-from e2efly.validation.plant_sight import Sight, Watch
+from e2efly.validation.plant_sight import PlantWatch, Sight
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.starts import Starts, draw_starts
 from e2efly.validation.stress import draws
@@ -73,11 +73,11 @@ def test_a_policy_flies_by_what_the_plant_sees(plant: str) -> None:
 
 @pytest.mark.whole
 def test_a_policy_that_is_shown_nothing_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(self: Watch, k: int, states: Any) -> list[np.ndarray]:
+    def nothing(self: PlantWatch, k: int, states: Any) -> list[np.ndarray]:
         del k, states
         return [np.full((c.height, c.width), 0.0, np.float32) for c in self.sight.cameras]
 
-    monkeypatch.setattr(Watch, "images", nothing)
+    monkeypatch.setattr(PlantWatch, "images", nothing)
     found = e2efly.validate("land_visual", "simulator", 4)
     assert not found.criteria["land_visual"].flown.success.any()
 

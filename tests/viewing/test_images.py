@@ -10,7 +10,7 @@ from e2efly.config import CameraConfig, ImuConfig
 from e2efly.environment import random_key
 from e2efly.simulation.scenes.scene import COLOURS, GROUND, Scene
 from e2efly.viewing.cloud import cloud
-from e2efly.viewing.image_plots import DISTANCE, Sight, exposure, in_colours, look_around
+from e2efly.viewing.image_plots import DISTANCE, ImageSight, exposure, in_colours, look_around
 from e2efly.viewing.noise_plots import plot_depth_noise, plot_image_noise, plot_imu
 from tests.viewing.test_plots import check_png
 
@@ -18,12 +18,12 @@ CAMERA = CameraConfig(width=32, height=16, fov=(1.4, 0.8), pitch=0.5, reach=(0.3
 
 
 @pytest.fixture(scope="module")
-def sight() -> Sight:
+def sight() -> ImageSight:
     """Of the bare ground from 2 m, nose down by 0.5 rad."""
     return look_around(CAMERA, Scene.of({}, 1), 0.0, np.array([1.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
-def test_range_runs_along_the_rays_and_depth_along_the_axis(sight: Sight) -> None:
+def test_range_runs_along_the_rays_and_depth_along_the_axis(sight: ImageSight) -> None:
     np.testing.assert_allclose(np.linalg.norm(sight.directions, axis=-1), 1.0, rtol=1e-5)
     down = np.where(sight.directions[..., 2] < -0.05, -2.0 / sight.directions[..., 2], np.inf)
     np.testing.assert_allclose(sight.images["range"], np.minimum(down, 6.0), rtol=1e-4)
@@ -44,7 +44,7 @@ def test_colours_of_each_sensor() -> None:
 
 
 @pytest.mark.whole
-def test_pictures_of_noise(tmp_path: Path, sight: Sight) -> None:
+def test_pictures_of_noise(tmp_path: Path, sight: ImageSight) -> None:
     plot_depth_noise(sight, random_key(0), tmp_path / "depth.png")
     plot_image_noise(sight, np.ones((16, 32), np.float32), random_key(0), tmp_path / "image.png")
     plot_imu(dataclasses.replace(ImuConfig(), gyro_bias=1e-3), random_key(0), tmp_path / "imu.png", 30.0)

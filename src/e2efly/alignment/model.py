@@ -12,7 +12,7 @@ from jax import Array
 from e2efly.alignment.windows import STEP, past_steps
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.control.vectors import Quat
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import INTEGRATORS
@@ -179,7 +179,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     x, y = jnp.sign(model.base.rotor_position).T
     sides = jnp.stack([y, -x, jnp.asarray(model.base.rotor_spin)])
     share = jnp.exp(q[FACTOR]) * (1 - q[LOST] * window["when"]) * (1 + q[UNEVEN] @ sides)
-    plant = Plant.of(vehicle, STEP, share)
+    plant = Airframe.of(vehicle, STEP, share)
     before, acting = commanded(model, vehicle, window["driven"])
     places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
     added = {
@@ -231,7 +231,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     return _sensed(plant, whole, q, earlier if model.driver == "motor" else None)
 
 
-def _spinning(plant: Plant, asked: Array) -> Array:
+def _spinning(plant: Airframe, asked: Array) -> Array:
     """Rotor speeds, (t, 4), that follow the requested speeds of each step with a first-order lag. They begin at the
     first requested speeds.
     """
@@ -268,7 +268,7 @@ def _driven_speed(model: Model, output: tuple[Array, ...], added: dict[str, Any]
     return rotor_speed_for(model.base, (a, b, c, d))
 
 
-def _without_torque(plant: Plant) -> Plant:
+def _without_torque(plant: Airframe) -> Airframe:
     zero, one = jnp.zeros_like(plant.torque_ratio), jnp.ones_like(plant.specific)
     arms, ones = (zero, zero, zero, zero), Vec3(one, one, one)
     return dataclasses.replace(plant, arm_x=arms, arm_y=arms, torque_ratio=zero, inertia=ones, mobility=ones)
@@ -297,7 +297,7 @@ def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Arr
     return mean[: past_steps()], mean[past_steps() :]
 
 
-def _sensed(plant: Plant, parts: Parts, q: Array, earlier: Array | None = None) -> dict[str, Array]:
+def _sensed(plant: Airframe, parts: Parts, q: Array, earlier: Array | None = None) -> dict[str, Array]:
     """The simulated sensor readings. The accelerometer passes its filter if the earlier rotor speeds, (past, 4), are
     known.
     """

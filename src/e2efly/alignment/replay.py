@@ -13,7 +13,7 @@ from e2efly.alignment.model import NUISANCES, START, Model, attitude_error, comm
 from e2efly.alignment.windows import MEASURED, STEP, integral, on_grid, past_steps
 from e2efly.control import COMMAND_MODES
 from e2efly.logs.recording import KINDS, Record
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import lagged
 from e2efly.simulation.physics.state import Parts, State, split4
@@ -106,7 +106,7 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     rates.
     """
     vehicle, before = vehicle_of(model, p), window["before"]
-    plant = Plant.of(vehicle, STEP)
+    plant = Airframe.of(vehicle, STEP)
     asked, _ = commanded(model, vehicle, window["driven"])
     law = control_law(COMMAND_MODES["ctbr"])
     controller = model.controller(vehicle)

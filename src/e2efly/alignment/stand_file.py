@@ -62,7 +62,7 @@ IDLE_PULSE = 1000.0
 """Pulse of an ESC without throttle, us. Full throttle is 1000 us longer."""
 
 
-class Place(NamedTuple):
+class FilePlace(NamedTuple):
     """A column of the file that holds a quantity: factor * entry - offset, in our unit."""
 
     column: int
@@ -154,7 +154,7 @@ def _number(path: Path, line: int, name: str, entry: str) -> float:
     return value
 
 
-def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> list[Place]:
+def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> list[FilePlace]:
     """The columns that hold a quantity. What `--columns` names stands in place of what the header says."""
     places = [place for i, name in enumerate(header) if (place := _place(i, name))]
     for ours, column in columns.items():
@@ -165,7 +165,7 @@ def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> lis
         if column.theirs not in header:
             raise ValueError(f"{path}: --columns says that {ours} is {unknown('column', column.theirs, header)}")
         index, (_, unit) = header.index(column.theirs), _parts(column.theirs)
-        chosen = Place(index, quantity, column.factor * (_RPM if ours == "rpm" else 1.0))
+        chosen = FilePlace(index, quantity, column.factor * (_RPM if ours == "rpm" else 1.0))
         if column.factor == 1 and unit:
             if unit not in UNITS[quantity]:
                 raise ValueError(
@@ -177,10 +177,10 @@ def _places(path: Path, header: list[str], columns: Mapping[str, Column]) -> lis
     return places
 
 
-def _place(index: int, header: str) -> Place | None:
+def _place(index: int, header: str) -> FilePlace | None:
     """The quantity that a header names. None: none that is known, in no unit that is known."""
     if header in COLUMNS:
-        return Place(index, "rotor_speed", _RPM) if header == "rpm" else Place(index, header, 1.0)
+        return FilePlace(index, "rotor_speed", _RPM) if header == "rpm" else FilePlace(index, header, 1.0)
     name, unit = _parts(header)
     words = set(re.findall(r"[^\W_]+", name.casefold()))
     for quantity, names in WORDS.items():
@@ -190,10 +190,10 @@ def _place(index: int, header: str) -> Place | None:
     return None
 
 
-def _with_unit(index: int, quantity: str, unit: str) -> Place:
+def _with_unit(index: int, quantity: str, unit: str) -> FilePlace:
     factor = UNITS[quantity][unit]
     pulse = quantity == "throttle" and unit == "us"
-    return Place(index, quantity, factor, IDLE_PULSE * factor if pulse else 0.0)
+    return FilePlace(index, quantity, factor, IDLE_PULSE * factor if pulse else 0.0)
 
 
 def _parts(header: str) -> tuple[str, str]:

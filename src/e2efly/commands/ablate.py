@@ -69,7 +69,7 @@ def run(options: Ablate) -> int:
 
 def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], console: Console) -> int:
     """Run the ablation in a folder that no other process uses."""
-    from e2efly.viewing.ablation_plots import Panel, plot_ablation
+    from e2efly.viewing.ablation_plots import CurvePanel, plot_ablation
 
     known = {pair: _known(options, config) for pair, config in configs.items()}
     lines: list[str] = []
@@ -80,7 +80,7 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
             curves = known[algo, task] or _curves(options, configs[algo, task], console)
             vehicles = _vehicles(configs[algo, task])
             rows = _rows(curves, 100 * criterion(None, vehicles))
-            panels.append(Panel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
+            panels.append(CurvePanel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
             console.print(
                 f"\n{task} by {algo.upper()}: {len(curves.variants)} rewards, {options.seeds} seeds, {vehicles}, {took}"
@@ -142,7 +142,7 @@ def _known(options: Ablate, config: TrainConfig) -> Any:
 
 def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
     """Train all variants of a configuration and keep their curves."""
-    from e2efly.learning.ablation import Kept, ablate
+    from e2efly.learning.ablation import KeptRun, ablate
     from e2efly.simulation.rewards import grouped
 
     task, algo = config.task.name, config.algo.name
@@ -158,7 +158,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
             done = share * steps
             progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, _vehicles(config))
 
-        kept = Kept(_path(options, config).with_suffix(".safetensors"), _about(options, config))
+        kept = KeptRun(_path(options, config).with_suffix(".safetensors"), _about(options, config))
         curves = ablate(config, options.seeds, told, kept, options.by)
     content = {
         "about": _about(options, config),

@@ -67,7 +67,7 @@ class Eval:
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedEval:
     """What `e2efly eval` is asked to do."""
 
     options: Eval
@@ -78,7 +78,7 @@ class Asked:
     """The same for `--task`."""
 
 
-def parse(arguments: list[str]) -> Asked:
+def parse(arguments: list[str]) -> AskedEval:
     """The options of `eval`. The defaults of `--env` and `--task` come from the policy's run or contract.
 
     Raises:
@@ -86,7 +86,7 @@ def parse(arguments: list[str]) -> Asked:
     """
     given = [argument for argument in arguments if argument.startswith(("--env.", "--task."))]
     if not given or asks_help(arguments):
-        return Asked(parse_options(Eval, "eval", arguments), {}, {})
+        return AskedEval(parse_options(Eval, "eval", arguments), {}, {})
     found = named_first("eval", arguments, given[0])
     from e2efly.validation.evaluation import pinned
 
@@ -99,10 +99,10 @@ def parse(arguments: list[str]) -> Asked:
     env = options.env
     if not any(argument.startswith("--env.randomize") for argument in given):
         env = dataclasses.replace(env, randomize=own.randomize)
-    return Asked(options, values(own, env), values(found.task, options.task))
+    return AskedEval(options, values(own, env), values(found.task, options.task))
 
 
-def run(asked: Asked) -> int:
+def run(asked: AskedEval) -> int:
     """Fly the ONNX file itself from unseen starts. Print a table; write the report and the plots.
 
     Returns:

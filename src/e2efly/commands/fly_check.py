@@ -20,7 +20,7 @@ from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.process import printable
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.flight.sight.picture import blocks, colours, sheet, write_png
-from e2efly.flight.sight.quality import Seen
+from e2efly.flight.sight.quality import SeenImages
 from e2efly.flight.sight.samples import read_samples
 from e2efly.policy.contract import Contract
 from e2efly.policy.images import Image
@@ -181,7 +181,7 @@ def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path |
             table.add_row("", _cell(f"what the network is shown{beside}; larger: {path}"))
 
 
-def _image(camera: ImageSource, seen: Seen, now: float, rate: float) -> str:
+def _image(camera: ImageSource, seen: SeenImages, now: float, rate: float) -> str:
     """What a camera shows, in words."""
     said = seen.problem(now)
     if said is not None or seen.frame is None:

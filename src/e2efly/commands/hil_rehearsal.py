@@ -74,7 +74,7 @@ def rehearse(o: Hil, task: dict[str, Any], origin: Origin) -> int:
     from e2efly.validation import firmware_program
     from e2efly.validation.evaluation import candidate
     from e2efly.validation.processes import flags
-    from e2efly.validation.rehearse_hil import Plan, draw
+    from e2efly.validation.rehearse_hil import RehearsalPlan, draw
     from e2efly.validation.rehearse_hil import rehearse as fly
     from e2efly.validation.scene_files import SceneFile
     from e2efly.viewing.hil_plots import plot_lap, plot_times
@@ -86,7 +86,7 @@ def rehearse(o: Hil, task: dict[str, Any], origin: Origin) -> int:
     for note in found.notes:
         console.print(note, style="dim")
     world = flags("task", found.task, candidate(o.policy, o.vehicle).task)
-    plan = Plan(found, origin, o.rate, o.pose_delay, o.link_delay, world)
+    plan = RehearsalPlan(found, origin, o.rate, o.pose_delay, o.link_delay, world)
     if o.scene is not None:
         plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.scene_materials, o.beside))
     if not plan.found.policy.contract.images:

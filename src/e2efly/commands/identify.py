@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate
     from e2efly.alignment.identification import Found
     from e2efly.alignment.prediction import Prediction
-    from e2efly.logs.readers import Reading
+    from e2efly.logs.readers import LogReading
     from e2efly.logs.recording import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
@@ -157,7 +157,7 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
     return files
 
 
-def _records(files: Sequence[Path], reading: "Reading", vehicle: Vehicle, console: Console) -> "list[Record]":
+def _records(files: Sequence[Path], reading: "LogReading", vehicle: Vehicle, console: Console) -> "list[Record]":
     from e2efly.alignment.checks import checked
     from e2efly.logs.blackbox_merge import with_blackboxes
     from e2efly.logs.readers import read_part

@@ -8,7 +8,7 @@ from rich.console import Console
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from e2efly.logs.readers import Reading
+    from e2efly.logs.readers import LogReading
     from e2efly.logs.recording import Record
 
 
@@ -25,16 +25,16 @@ class LogOptions:
     without: tuple[str, ...] = ()
     """Streams that are left out, such as rotor_speed."""
 
-    def reading(self, known: "Collection[str] | None" = None) -> "Reading":
+    def reading(self, known: "Collection[str] | None" = None) -> "LogReading":
         """The options, checked. `known`: our names of columns; those of flights unless given.
 
         Raises:
             ValueError: naming the option that is wrong, and what is accepted.
         """
         from e2efly.logs.csv_file import COLUMNS, column_map
-        from e2efly.logs.readers import Reading
+        from e2efly.logs.readers import LogReading
 
-        return Reading(column_map(self.columns, COLUMNS if known is None else known), self.topics, self.without)
+        return LogReading(column_map(self.columns, COLUMNS if known is None else known), self.topics, self.without)
 
 
 def show_notes(records: "Sequence[Record]", console: Console, known: "Sequence[Record]" = ()) -> None:

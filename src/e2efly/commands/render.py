@@ -118,11 +118,11 @@ def run(options: Render) -> int:
 
 def _policy(options: Render) -> int:
     """A video of a policy in flight, with the images of its cameras."""
-    from e2efly.commands.watch import Watch, run
+    from e2efly.commands.watch import WatchOptions, run
 
     out = options.out or Path("runs/render") / beside(policy_file(options.scene)).name
     _make(out)
-    return run(Watch(what=(options.scene,), seed=options.seed, video=out / "flight.gif"))
+    return run(WatchOptions(what=(options.scene,), seed=options.seed, video=out / "flight.gif"))
 
 
 def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -118,7 +118,7 @@ def _train(o: Train, again: str, console: Console) -> int:
         console.print(f"Watch it at {page.address} once it flies: the page has the time that the training leaves.")
     try:
         title = f"{o.config.task.name} by {o.config.algo.name}"
-        with TerminalProgress(console, title) if page is None else _Shown(console, title, page) as progress:
+        with TerminalProgress(console, title) if page is None else _ShownTraining(console, title, page) as progress:
             summary = train(o.config, o.out, progress, o.resume, o.overwrite, traced=traced_folder(o.config))
         status = _tell(o, again, console, summary, progress)
         if page is not None and status == 0:
@@ -139,7 +139,7 @@ def _page(o: Train) -> "Beside | None":
     return Beside(o.watch, str(o.out))
 
 
-class _Shown(TerminalProgress):
+class _ShownTraining(TerminalProgress):
     """The progress in the terminal, and a page that begins with the first policy."""
 
     def __init__(self, console: Console, title: str, page: "Beside") -> None:

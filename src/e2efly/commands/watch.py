@@ -20,10 +20,10 @@ from e2efly.policy.zoo import policy_file
 
 if TYPE_CHECKING:
     from e2efly.viewing.watch.recorded import Recording
-    from e2efly.viewing.watch.report import Shown
+    from e2efly.viewing.watch.report import ShownReport
     from e2efly.viewing.watch.simulation import Simulation
     from e2efly.viewing.watch.stage import Source
-    from e2efly.viewing.watch.training import Progress
+    from e2efly.viewing.watch.training import ShownProgress
 
 MOST = 1024
 """Largest number of vehicles."""
@@ -36,7 +36,7 @@ FILM_S, FILM_HZ = 8.0, 25.0
 
 
 @dataclass(frozen=True)
-class Watch:
+class WatchOptions:
     """Watch flights in a browser: a live policy, a training in progress, flight logs, or a validation.
 
     A policy flies in the simulator: drag its goal, throw it, change wind, mass, thrust and delay while it flies. See
@@ -75,7 +75,7 @@ class Watch:
     """Camera of the video."""
 
 
-def run(options: Watch) -> int:
+def run(options: WatchOptions) -> int:
     """Serve the page, or draw the video.
 
     Raises:
@@ -130,7 +130,7 @@ def _logs(what: Sequence[str], vehicle: str | None) -> list[Path]:
     return logs
 
 
-def _serve(o: Watch, server: Any, logs: list[Path], ready: Callable[[], None]) -> None:
+def _serve(o: WatchOptions, server: Any, logs: list[Path], ready: Callable[[], None]) -> None:
     """Show what is asked for, and call `ready` once it is known to exist."""
     from e2efly.viewing.watch.loop import run as loop
     from e2efly.viewing.watch.panels import Panel, hands_on, policies_on, starts_on, times_on
@@ -184,7 +184,7 @@ def _is_source(text: str) -> bool:
 
 
 @contextmanager
-def _poses(o: Watch) -> "Iterator[Any]":
+def _poses(o: WatchOptions) -> "Iterator[Any]":
     """A vehicle at the poses of a pose source."""
     from e2efly.flight.pose.sources import open_source
     from e2efly.simulation.scenes.faces import bodies
@@ -212,7 +212,7 @@ def _poses(o: Watch) -> "Iterator[Any]":
         source.close()
 
 
-def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
+def _draw(o: WatchOptions, path: Path, logs: list[Path], console: Terminal) -> int:
     from e2efly.viewing.video import check_film, write_film
     from e2efly.viewing.watch.film import film
 
@@ -234,7 +234,7 @@ def _draw(o: Watch, path: Path, logs: list[Path], console: Terminal) -> int:
     return 0
 
 
-def _recording(o: Watch, logs: list[Path]) -> Any:
+def _recording(o: WatchOptions, logs: list[Path]) -> Any:
     from e2efly.vehicles.loading import load_vehicle
     from e2efly.viewing.watch.recorded import Recording, read_flight, vehicle_of
 
@@ -255,7 +255,7 @@ def _report(what: tuple[str, ...]) -> Path | None:
     return report_of(path)
 
 
-def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
+def _reported(o: WatchOptions, report: Path) -> "tuple[Recording, list[ShownReport]]":
     """The first start of a report in the requested criterion, and all starts."""
     if o.vehicle is not None:
         raise ValueError(f"--vehicle is {o.vehicle!r}; accepted: left out, as {report} says what flew")
@@ -269,7 +269,7 @@ def _reported(o: Watch, report: Path) -> "tuple[Recording, list[Shown]]":
     return Recording(first.flights, vehicle, first.stage), starts
 
 
-def _flown(o: Watch, console: Terminal) -> "tuple[Simulation, Progress | None]":
+def _flown(o: WatchOptions, console: Terminal) -> "tuple[Simulation, ShownProgress | None]":
     """The simulation of a policy, and the progress of its run if it belongs to one."""
     from e2efly.simulation.device import prepare
 

@@ -99,7 +99,7 @@ def trimmed(trim: float, error: float, dt: float, gain: float = TRIM_GAIN, most:
 
 
 @dataclass(frozen=True)
-class Room:
+class ManoeuvreRoom:
     """The space in which an excitation flight stays, and its stopping behaviour."""
 
     low: np.ndarray
@@ -135,7 +135,7 @@ def length_for(speed: float, braking: float, reaction: float) -> float:
 
 
 @dataclass(frozen=True)
-class Progress:
+class ManoeuvreProgress:
     """The state that one control step of an excitation flight passes to the next."""
 
     centre: np.ndarray
@@ -152,18 +152,24 @@ class Progress:
     """Time of the last step, s from the beginning."""
 
     @staticmethod
-    def begin(room: Room, position: np.ndarray, yaw: float) -> "Progress":
+    def begin(room: ManoeuvreRoom, position: np.ndarray, yaw: float) -> "ManoeuvreProgress":
         """Begin at the vehicle's position.
 
         The centre is moved away from the room's edges, so that lines can pass through it.
         """
         inner = CENTRAL * (room.high - room.low)
-        return Progress(np.clip(position, room.low + inner, room.high - inner), yaw)
+        return ManoeuvreProgress(np.clip(position, room.low + inner, room.high - inner), yaw)
 
 
 def excite(
-    vehicle: Vehicle, room: Room, speed: float, duration: float, before: Progress, time: float, motion: Motion
-) -> tuple[Progress, Ctbr]:
+    vehicle: Vehicle,
+    room: ManoeuvreRoom,
+    speed: float,
+    duration: float,
+    before: ManoeuvreProgress,
+    time: float,
+    motion: Motion,
+) -> tuple[ManoeuvreProgress, Ctbr]:
     """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure.
 
     Args:
@@ -203,10 +209,10 @@ def excite(
     trim = trimmed(before.trim, float(wanted[2] - velocity[2]), min(max(time - before.time, 0.0), 0.1))
     found = reach(vehicle, motion, Vec3(*wanted), np.float64(yaw))
     command = limited(vehicle, max(float(found.thrust) + trim + push, 0.0), found.rate + Vec3(*rates))
-    return Progress(before.centre, before.yaw, leg, since, trim, time), command
+    return ManoeuvreProgress(before.centre, before.yaw, leg, since, trim, time), command
 
 
-def kick_for(vehicle: Vehicle, room: Room) -> float:
+def kick_for(vehicle: Vehicle, room: ManoeuvreRoom) -> float:
     """Thrust over mass that a kick adds to that of hover, m/s^2.
 
     It is limited by the height in which the climb can stop.

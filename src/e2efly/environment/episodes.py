@@ -60,7 +60,7 @@ class Episodes:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class UnderWay:
+class EpisodesUnderWay:
     """The state of n episodes between two control steps, and their results so far."""
 
     state: EnvState
@@ -73,14 +73,14 @@ class UnderWay:
     """Number of control steps in the mean error."""
 
     @staticmethod
-    def of(state: EnvState, observation: Float[Array, "n o"]) -> "UnderWay":
+    def of(state: EnvState, observation: Float[Array, "n o"]) -> "EpisodesUnderWay":
         """The episodes at their start."""
         n = observation.shape[0]
         zero, no = jnp.zeros(n), jnp.zeros(n, bool)
         none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, zero, no)
-        return UnderWay(state, observation, no, none, zero)
+        return EpisodesUnderWay(state, observation, no, none, zero)
 
-    def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "UnderWay":
+    def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "EpisodesUnderWay":
         """The episodes one control step later. The mean error counts from `settle` s on."""
         state, over, e = self.state, self.over, self.so_far
         reached, out = env.step(state, action, restart=False)
@@ -101,7 +101,7 @@ class UnderWay:
             reward=e.reward + live * out.reward,
             crashed=e.crashed | (out.terminated & ~out.success & ~over),
         )
-        return UnderWay(reached, out.final_observation, over | out.done, e, self.counted + counts)
+        return EpisodesUnderWay(reached, out.final_observation, over | out.done, e, self.counted + counts)
 
     def episodes(self, env: Env) -> Episodes:
         """The results of the episodes."""
@@ -140,16 +140,16 @@ def run_episodes(
     state, observation = env.reset(key, n)
     state, observation = part_of(altered(state), observation, part)
 
-    def goes_on(carry: tuple[Array, UnderWay, Array]) -> Array:
+    def goes_on(carry: tuple[Array, EpisodesUnderWay, Array]) -> Array:
         done, flight, _ = carry
         return (done < steps) & ~jnp.all(flight.over)
 
-    def step(carry: tuple[Array, UnderWay, Array]) -> tuple[Array, UnderWay, Array]:
+    def step(carry: tuple[Array, EpisodesUnderWay, Array]) -> tuple[Array, EpisodesUnderWay, Array]:
         done, flight, memory = carry
         action, memory = act.act(flight.observation, flight.state.images, memory)
         return done + 1, flight.after(env, action, settle), memory
 
-    first = jnp.zeros((), jnp.int32), UnderWay.of(state, observation), act.begin(observation.shape[0])
+    first = jnp.zeros((), jnp.int32), EpisodesUnderWay.of(state, observation), act.begin(observation.shape[0])
     return jax.lax.while_loop(goes_on, step, first)[1].episodes(env)
 
 
@@ -173,7 +173,7 @@ def run_stepwise(
     begin, after, _ = _programs(n, bool(env.cameras))
     state, observation = begin(env, key)
     first = altered(state)
-    flight, memory = UnderWay.of(first, observation), act.begin(n)
+    flight, memory = EpisodesUnderWay.of(first, observation), act.begin(n)
     for _ in range(steps):
         action, memory = _asked(act, flight.observation, flight.state, memory)
         flight = after(env, flight, action, settle)

@@ -24,7 +24,7 @@ DAMPED = 0.6
 
 
 @dataclass(frozen=True)
-class Motion:
+class ExpertMotion:
     """What the cascade knows of the vehicle."""
 
     position: Vec3
@@ -38,7 +38,7 @@ def ahead(
     commands: Float[Array, "n k 4"],
     latency: Float[Array, " n"],
     period: float,
-) -> Motion:
+) -> ExpertMotion:
     """Where a vehicle will be when the command that is chosen now takes effect.
 
     Body rates follow with a single lag for the rate loop and the motors. The thrust follows at once.
@@ -64,11 +64,15 @@ def ahead(
         acceleration = attitude.z_axis() * commands[:, i, 0] - Vec3(0.0, 0.0, GRAVITY)
         position = position + velocity * time + acceleration * (time**2 / 2)
         velocity = velocity + acceleration * time
-    return Motion(position, velocity, attitude)
+    return ExpertMotion(position, velocity, attitude)
 
 
 def command(
-    vehicle: Vehicle, largest: Float[Array, ""], motion: Motion, velocity: Float[Array, "n 3"], yaw: Float[Array, " n"]
+    vehicle: Vehicle,
+    largest: Float[Array, ""],
+    motion: ExpertMotion,
+    velocity: Float[Array, "n 3"],
+    yaw: Float[Array, " n"],
 ) -> Float[Array, "n 4"]:
     """Collective thrust, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
 

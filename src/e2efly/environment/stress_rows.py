@@ -32,7 +32,7 @@ VIO = NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02)
 
 
 @dataclass(frozen=True)
-class Row:
+class StressRow:
     """One way in which reality differs from the training."""
 
     name: str
@@ -77,32 +77,32 @@ class Row:
         return frozenset(self.factors) | {name for name, there in beside.items() if there}
 
 
-def _factor(what: str, factor: float, *fields: str) -> Row:
-    return Row(f"{what} x{factor:g}", dict.fromkeys(fields, factor))
+def _factor(what: str, factor: float, *fields: str) -> StressRow:
+    return StressRow(f"{what} x{factor:g}", dict.fromkeys(fields, factor))
 
 
-ROWS: dict[str, Row] = {
+ROWS: dict[str, StressRow] = {
     row.name: row
     for row in (
-        Row("nominal"),
+        StressRow("nominal"),
         *(_factor("mass", x, "mass") for x in (0.8, 1.25)),
         *(_factor("thrust", x, "thrust_map") for x in (0.8, 1.15)),
         *(_factor("inertia", x, "inertia") for x in (0.6, 1.5)),
         *(_factor("motor lag", x, "motor_time_constant") for x in (0.5, 2.0)),
-        *(Row(f"delay {1e3 * x:+.0f} ms", latency=x) for x in (-0.03, 0.02, LATEST)),
+        *(StressRow(f"delay {1e3 * x:+.0f} ms", latency=x) for x in (-0.03, 0.02, LATEST)),
         *(_factor("drag", x, "drag_linear", "drag_quadratic") for x in (0.0, 2.0)),
         *(_factor("torque ratio", x, "torque_ratio") for x in (0.7, 1.3)),
         *(_factor("rate loop", x, "rate_gain") for x in (0.5, 2.0)),
-        Row("thrust falls by 15 %", sag=0.15),
-        Row("one rotor 10 % weaker", rotor=0.1),
-        Row("centre of mass 5 mm off", centre_of_mass=0.005),
-        Row("wind 3 m/s", wind=3.0),
-        Row("gusts 1.5 m/s", gust=1.5),
-        Row("mixer clips each rotor", plain_mixer=True),
-        Row("noise of motion capture", noise=MOCAP),
-        Row("noise and drift of a VIO", noise=VIO, drift=0.005),
-        Row(ALL),
-        *(Row(name, camera=row) for name, row in CAMERAS.items()),
+        StressRow("thrust falls by 15 %", sag=0.15),
+        StressRow("one rotor 10 % weaker", rotor=0.1),
+        StressRow("centre of mass 5 mm off", centre_of_mass=0.005),
+        StressRow("wind 3 m/s", wind=3.0),
+        StressRow("gusts 1.5 m/s", gust=1.5),
+        StressRow("mixer clips each rotor", plain_mixer=True),
+        StressRow("noise of motion capture", noise=MOCAP),
+        StressRow("noise and drift of a VIO", noise=VIO, drift=0.005),
+        StressRow(ALL),
+        *(StressRow(name, camera=row) for name, row in CAMERAS.items()),
     )
 }
 """The rows by name. The position of a row determines what it draws, so new rows are added at the end."""
@@ -131,7 +131,7 @@ class Draw:
     camera: CameraDraw
 
     @staticmethod
-    def of(row: Row, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
+    def of(row: StressRow, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
         """Draw n episodes of a row for a nominal vehicle; `ALL` draws every strength between the rows' extremes."""
         rows, everything = tuple(ROWS.values()), row.name == ALL
 

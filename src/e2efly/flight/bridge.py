@@ -30,7 +30,7 @@ from e2efly.flight.log_record import (
     record_sent,
 )  # fmt: skip
 from e2efly.flight.pilot import estimate, guidance, inertial, state_machine
-from e2efly.flight.pilot.estimate import LATE_S, Estimate, height_of
+from e2efly.flight.pilot.estimate import LATE_S, StateEstimate, height_of
 from e2efly.flight.pilot.flight_state import AIRBORNE, GROUNDED, Flight, Inputs, Mode
 from e2efly.flight.pilot.hover import LIFTED, controlled, flight_gains, rates_of
 from e2efly.flight.pilot.hovering import DEFAULT, HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
@@ -44,7 +44,7 @@ from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.sight import quality
 from e2efly.flight.sight.image_source import ImageSource
-from e2efly.flight.sight.quality import Seen as Watched
+from e2efly.flight.sight.quality import SeenImages
 from e2efly.policy.odometry import Odometry, Sample, yaw_of
 from e2efly.policy.runtime import Decision, Imu
 from e2efly.policy.worker import Worker
@@ -125,12 +125,12 @@ class Bridge:
         """`land_now`: the operator asks for a landing, as the pilot does with the mission switch."""
         self.cameras = tuple(cameras)
         images = () if worker is None else worker.images
-        self.seen = tuple(Watched(image) for image, _ in zip(images, self.cameras, strict=True))
+        self.seen = tuple(SeenImages(image) for image, _ in zip(images, self.cameras, strict=True))
         """What is known about each camera."""
         self.instruments = Instruments(client, settings)
         self.adopt(info, settings_problems)
         self.flight, self.inputs = Flight(home=settings.ground_height), Inputs()
-        self.estimate = Estimate(Checks(max_age=settings.odometry_timeout), delay + LATE_S)
+        self.estimate = StateEstimate(Checks(max_age=settings.odometry_timeout), delay + LATE_S)
         self.map = throttle_map or ThrottleMap.of(vehicle)
         self.trim = 0.0
         """Thrust that compensates for an error of the throttle map, m/s^2."""

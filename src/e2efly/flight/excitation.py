@@ -13,7 +13,7 @@ import numpy as np
 from e2efly import __version__
 from e2efly.config.numbers import SPEED, check_fields, number
 from e2efly.control import COMMAND_MODES, Quat, Vec3, command_limits
-from e2efly.control.manoeuvres import DURATION, TILT, Progress, Room, excite, length_for, softened
+from e2efly.control.manoeuvres import DURATION, TILT, ManoeuvreProgress, ManoeuvreRoom, excite, length_for, softened
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.messages import Motor, RawImu
 from e2efly.flight.pilot.hover import FlightMotion, flight_gains
@@ -88,7 +88,7 @@ class Excitation:
     """What it observes and commands."""
     vehicle: Vehicle
     """The vehicle with the gains for steering."""
-    room: Room
+    room: ManoeuvreRoom
     """The room in which it stays."""
     speed: float
     """Speed of its fastest line, m/s."""
@@ -117,7 +117,9 @@ class Excitation:
         seen = {name: np.asarray(observation[part], np.float64) for name, part in self.contract.slices.items()}
         place, attitude = seen[_PLACE.name], Quat(*seen[ATTITUDE.name])
         motion = FlightMotion(Vec3(*place), Vec3(*seen[VELOCITY.name]), attitude)
-        before = Progress.begin(self.room, place, float(attitude.yaw())) if memory is None else _progress(memory)
+        before = (
+            ManoeuvreProgress.begin(self.room, place, float(attitude.yaw())) if memory is None else _progress(memory)
+        )
         after, command = excite(
             self.vehicle, self.room, self.speed, self.seconds, before, float(seen[_ELAPSED.name][0]), motion
         )
@@ -149,7 +151,7 @@ def excitation(
     return acts, Course(goal, np.zeros(1), goal.middle, duration=options.seconds)
 
 
-def room_of(settings: FlightSettings) -> tuple[Room, float]:
+def room_of(settings: FlightSettings) -> tuple[ManoeuvreRoom, float]:
     """The room in which an excitation flight stays inside a fence, and the largest tilt for steering, rad.
 
     Raises:
@@ -173,7 +175,7 @@ def room_of(settings: FlightSettings) -> tuple[Room, float]:
         raise ValueError(
             f"flight.fence.tilt is {fence.tilt:g}; accepted for {NAME}: {LEAST_TILT + PULSED:g} rad or more"
         )
-    return Room(low, high, braking, reaction), min(TILT, fence.tilt - PULSED)
+    return ManoeuvreRoom(low, high, braking, reaction), min(TILT, fence.tilt - PULSED)
 
 
 def _contract(vehicle: Vehicle, latency: float) -> Contract:
@@ -192,11 +194,11 @@ def _contract(vehicle: Vehicle, latency: float) -> Contract:
 _MEMORY = 8
 
 
-def _memory(progress: Progress) -> np.ndarray:
+def _memory(progress: ManoeuvreProgress) -> np.ndarray:
     p = progress
     return np.array([*p.centre, p.yaw, p.leg, p.since, p.trim, p.time])
 
 
-def _progress(memory: np.ndarray) -> Progress:
+def _progress(memory: np.ndarray) -> ManoeuvreProgress:
     yaw, leg, since, trim, time = (float(x) for x in memory[3:])
-    return Progress(np.asarray(memory[:3]), yaw, int(leg), since, trim, time)
+    return ManoeuvreProgress(np.asarray(memory[:3]), yaw, int(leg), since, trim, time)

@@ -16,7 +16,7 @@ from e2efly.control import Ctbr
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.descent import Sense
 from e2efly.flight.betaflight.instruments import CLOSED
-from e2efly.flight.betaflight.watchdog import Plan, WatchedLink
+from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.log_record import Log
@@ -151,7 +151,7 @@ def fly(
                 due += math.ceil((done - due) / period) * period
 
 
-def plan_of(bridge: Bridge) -> Plan:
+def plan_of(bridge: Bridge) -> DescentPlan:
     """What the watchdog has to do from now on if the bridge falls silent."""
     sticks, voltage = bridge.sticks, bridge.inputs.voltage
 
@@ -171,7 +171,7 @@ def plan_of(bridge: Bridge) -> Plan:
     idle = sticks.arrange((mid, mid, mid, CLOSED), ())
     flying = bridge.flying or bridge.flight.mode is Mode.PILOT or bridge.inputs.armed
     sense = None if len(steps) == 1 else _sense(bridge)
-    return Plan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle, sense)
+    return DescentPlan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle, sense)
 
 
 def _sense(bridge: Bridge) -> Sense | None:

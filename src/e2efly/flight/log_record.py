@@ -10,7 +10,7 @@ from e2efly.flight.betaflight.client import Client, Reply
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
 from e2efly.flight.commander.commander import Commander
-from e2efly.flight.filter.guard import Change
+from e2efly.flight.filter.guard import CommandChange
 from e2efly.flight.pilot.flight_state import Flight
 from e2efly.flight.pilot.hover import rates_of
 from e2efly.flight.pilot.throttle_map import ThrottleMap
@@ -113,7 +113,7 @@ def record_sent(log: Log, now: float, sent: Sent, mode: str, setpoint: list[floa
     })  # fmt: skip
 
 
-def record_filter(log: Log, now: float, change: Change) -> None:
+def record_filter(log: Log, now: float, change: CommandChange) -> None:
     """Record how the filter changed a command. The command that was sent is in the channel `command`."""
     log.record("filter", now, {
         "limit": change.limit, "room": change.room, "share": change.share,

@@ -18,7 +18,7 @@ from e2efly.control import Quat
 from e2efly.flight.child import ROS_PYTHON, first_opened, pythons
 from e2efly.flight.outlet import Outlet
 from e2efly.flight.scripts.shared_images import AT_SEQUENCE, AT_SLOTS
-from e2efly.flight.sight.quality import Seen
+from e2efly.flight.sight.quality import SeenImages
 from e2efly.flight.sight.shared import SharedImages
 from e2efly.logs.channels import CHANNELS, json_schema
 from e2efly.logs.mcap_file import encode
@@ -45,7 +45,7 @@ _FORMS = {"depth": "32FC1", "range": "32FC1", "mask": "mono8", "rgb": "rgb8", "n
 
 
 @dataclass(frozen=True)
-class Target:
+class PublishTarget:
     """A destination for a flight's records."""
 
     text: str
@@ -56,7 +56,7 @@ class Target:
     """What this kind needs to know."""
 
 
-def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
+def targets_of(texts: Sequence[str]) -> tuple[PublishTarget, ...]:
     """Parse the texts of `--live`. Nothing is opened.
 
     Raises:
@@ -69,7 +69,7 @@ def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
     return found
 
 
-def _target(text: str) -> Target:
+def _target(text: str) -> PublishTarget:
     kind, colon, where = text.partition(":")
     refused = ValueError(f"--live is {text!r}; accepted: {FORMS}")
     if kind not in ADVICE or (colon and not where):
@@ -78,26 +78,29 @@ def _target(text: str) -> Target:
         host, _, port = where.rpartition(":")
         if where and not (port.isascii() and port.isdigit() and int(port) <= 65535):
             raise refused
-        return Target(text, kind, {"host": host.strip("[]") or "127.0.0.1", "port": int(port or PORT)})
+        return PublishTarget(text, kind, {"host": host.strip("[]") or "127.0.0.1", "port": int(port or PORT)})
     if kind in ("ros1", "ros2"):
         prefix = where.rstrip("/") if colon else PREFIX
         if prefix and not all(part.isascii() and part.isidentifier() for part in prefix[1:].split("/")):
             raise ValueError(f"--live is {text!r}; accepted: a prefix from the root, such as {kind}:{PREFIX}")
         if prefix and not prefix.startswith("/"):
             raise ValueError(f"--live is {text!r}; accepted: a prefix from the root, such as {kind}:{PREFIX}")
-        return Target(text, kind, {"prefix": prefix})
+        return PublishTarget(text, kind, {"prefix": prefix})
     if Path(where).suffix != f".{kind}":
         raise ValueError(f"--live is {text!r}; accepted: {kind}: and a file that ends in .{kind}")
     if Path(where).exists():
         raise ValueError(f"--live {text}: the file exists already; accepted: a new one")
-    return Target(text, kind, {"file": where})
+    return PublishTarget(text, kind, {"file": where})
 
 
 class Live:
     """A `Log` that several processes publish. Only the first method waits for them or raises."""
 
     def __init__(
-        self, targets: Sequence[Target], images: Sequence[Image] = (), say: Callable[[str], None] = lambda line: None
+        self,
+        targets: Sequence[PublishTarget],
+        images: Sequence[Image] = (),
+        say: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Start the processes.
 
@@ -141,7 +144,7 @@ class Live:
             if outlet.send(data):
                 self.say(f"live {outlet.name}: {outlet.ended}; the flight goes on without it")
 
-    def show(self, cameras: Sequence[Seen]) -> None:
+    def show(self, cameras: Sequence[SeenImages]) -> None:
         """Publish the images that the policy sees, if they are new. Call it after the sticks are sent."""
         for shown, seen in zip(self._images, cameras, strict=False):
             if seen.frame is not None and seen.frame.time != shown.last:
@@ -211,6 +214,6 @@ def _drawn(image: Image, values: np.ndarray) -> np.ndarray:
     return np.rint((np.clip(values, low, high) - low) * (255 / (high - low))).astype(np.uint8)
 
 
-def _opened(target: Target, config: dict[str, Any]) -> Outlet:
+def _opened(target: PublishTarget, config: dict[str, Any]) -> Outlet:
     variable = ROS_PYTHON if target.kind in ("ros1", "ros2") else THIS_PYTHON
     return first_opened(pythons(variable), ADVICE[target.kind], lambda p: Outlet(target.text, p, config))

@@ -53,7 +53,7 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptRun:
     """Where an ablation stores its progress, so that it can continue after it was stopped."""
 
     path: Path
@@ -82,7 +82,7 @@ def ablate(
     config: TrainConfig,
     seeds: int,
     told: Callable[[float, float], None] = lambda share, best: None,
-    kept: Kept | None = None,
+    kept: KeptRun | None = None,
     by: By = "term",
 ) -> Curves:
     """Train all variants.

@@ -49,7 +49,7 @@ class Stochastic:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Parameters:
+class ABPTParameters:
     """What ABPT learns."""
 
     policy: Weights
@@ -86,15 +86,15 @@ class Transition:
 class ABPT(Algorithm):
     """Amended back-propagation through time; see the module."""
 
-    def init(self, env: Env, config: ABPTConfig, seed: int) -> Parameters:
+    def init(self, env: Env, config: ABPTConfig, seed: int) -> ABPTParameters:
         """Fresh networks, made by NumPy."""
         rng = np.random.default_rng(seed)
         policy = self.actor.init(rng, np.asarray(env.hover))
         sizes = (self.actor.features.state_size + env.privileged_size + 4, *self.actor.network.hidden, 1)
         critics = (init_mlp(rng, sizes, 1.0), init_mlp(rng, sizes, 1.0))
-        return Parameters(policy, np.full(4, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics))
+        return ABPTParameters(policy, np.full(4, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics))
 
-    def optimizer(self, config: ABPTConfig, parameters: Parameters) -> dict[str, Any]:
+    def optimizer(self, config: ABPTConfig, parameters: ABPTParameters) -> dict[str, Any]:
         """The initial states of Adam for the policy and for the critics."""
         policy = Stochastic(parameters.policy, parameters.log_std)
         return {"policy": adam_state(config, policy), "critics": adam_state(config, parameters.critics)}
@@ -133,7 +133,7 @@ class ABPT(Algorithm):
         log_std = jnp.maximum(policy.log_std, QUIETEST)
         return end.into(
             state,
-            parameters=Parameters(policy.mean, log_std, critics, targets),
+            parameters=ABPTParameters(policy.mean, log_std, critics, targets),
             optimizer={"policy": policy_adam, "critics": critics_adam},
             key=key,
             replay={"transitions": ring, "places": places},
@@ -189,7 +189,7 @@ class ABPT(Algorithm):
         config: ABPTConfig,
         rate: Float[Array, ""],
         policy: Stochastic,
-        learned: Parameters,
+        learned: ABPTParameters,
         optimizer: Any,
         ring: Ring,
         key: PRNGKeyArray,

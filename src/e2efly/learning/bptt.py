@@ -26,12 +26,12 @@ from e2efly.learning.algorithm import (
     gradient_per_term,
 )
 from e2efly.learning.networks import Weights
-from e2efly.learning.rollout import Record, RolloutState, advance
+from e2efly.learning.rollout import RolloutState, StepRecord, advance
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Parameters:
+class BPTTParameters:
     """What BPTT learns."""
 
     policy: Weights
@@ -43,12 +43,12 @@ class Parameters:
 class BPTT(Algorithm):
     """Back-propagation through time; see the module."""
 
-    def init(self, env: Env, config: BPTTConfig, seed: int) -> Parameters:
+    def init(self, env: Env, config: BPTTConfig, seed: int) -> BPTTParameters:
         """A fresh network, made by NumPy."""
         policy = self.actor.init(np.random.default_rng(seed), np.asarray(env.hover))
-        return Parameters(policy, jax.tree.map(np.copy, policy))
+        return BPTTParameters(policy, jax.tree.map(np.copy, policy))
 
-    def optimizer(self, config: BPTTConfig, parameters: Parameters) -> Any:
+    def optimizer(self, config: BPTTConfig, parameters: BPTTParameters) -> Any:
         """Adam's initial state."""
         return adam_state(config, parameters.learner)
 
@@ -69,7 +69,7 @@ class BPTT(Algorithm):
             share = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
             policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         metrics |= {"loss/gradient_norm": norm, **norms}
-        return end.into(state, parameters=Parameters(policy, learner), optimizer=optimizer), metrics
+        return end.into(state, parameters=BPTTParameters(policy, learner), optimizer=optimizer), metrics
 
     def _window(
         self, env: Env, config: BPTTConfig, learner: Weights, state: TrainState, progress: Float[Array, ""]
@@ -79,7 +79,7 @@ class BPTT(Algorithm):
             features = self.actor.features(at.observation, at.env.images)
             action, memory = self.actor(learner, features, at.memory)
             after, out = advance(env, config, at, action, memory, critic=False)
-            record = Record.of(out)
+            record = StepRecord.of(out)
             parts = record.terms if config.term_gradients else {"reward": jnp.mean(out.reward)}
             return after, ({name: at.discount * x for name, x in parts.items()}, record)
 

@@ -12,7 +12,7 @@ from e2efly.environment import Env
 
 
 @dataclass(frozen=True)
-class Stage:
+class CurriculumStage:
     """The environment that is trained on until the promotion, and the environments that decide about the promotion."""
 
     env: Env
@@ -34,7 +34,7 @@ class Stage:
         return enough or (self.config.steps is not None and steps >= self.config.steps)
 
 
-def stages(config: TrainConfig) -> tuple[Stage, ...]:
+def stages(config: TrainConfig) -> tuple[CurriculumStage, ...]:
     """The stages of a run: those of the curriculum, then the task itself.
 
     Raises:
@@ -79,13 +79,13 @@ def changed(config: Any, path: str, value: Any, where: str) -> Any:
     return dataclasses.replace(config, **{name: value})
 
 
-def _stage(config: TrainConfig, task: TaskConfig, stage: StageConfig | None) -> Stage:
+def _stage(config: TrainConfig, task: TaskConfig, stage: StageConfig | None) -> CurriculumStage:
     env = Env.of(task, config.reward, config.env)
     judges = {name: Env.of(t, config.reward, config.env) for name, t in task.criteria().items()}
-    return Stage(env, judges, stage)
+    return CurriculumStage(env, judges, stage)
 
 
-def _shape(stage: Stage) -> Any:
+def _shape(stage: CurriculumStage) -> Any:
     """The structure, shapes and types that decide which program runs."""
     leaves, structure = jax.tree.flatten((stage.env, list(stage.judges.values())))
     return structure, [(np.shape(x), np.asarray(x).dtype) for x in leaves]

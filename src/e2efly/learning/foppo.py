@@ -18,14 +18,14 @@ from e2efly.environment import Env
 from e2efly.learning.algorithm import TrainState, adam_state, annealed, descend, gradient_cuts, gradient_per_term
 from e2efly.learning.critic import critic_input, value
 from e2efly.learning.networks import Weights
-from e2efly.learning.ppo import PPO, Acted, Parameters
+from e2efly.learning.ppo import PPO, Acted, PPOParameters
 from e2efly.learning.rollout import RolloutState, window
 
 
 class FOPPO(PPO):
     """PPO refined by first-order gradients; see the module."""
 
-    def optimizer(self, config: FOPPOConfig, parameters: Parameters) -> dict[str, Any]:
+    def optimizer(self, config: FOPPOConfig, parameters: PPOParameters) -> dict[str, Any]:
         """The initial states of Adam for PPO's epochs and for the exact gradient."""
         return {"epochs": adam_state(config, parameters), "exact": adam_state(config, parameters.policy)}
 
@@ -51,7 +51,7 @@ class FOPPO(PPO):
         self,
         env: Env,
         config: FOPPOConfig,
-        parameters: Parameters,
+        parameters: PPOParameters,
         state: TrainState,
         key: PRNGKeyArray,
         progress: Float[Array, ""],

@@ -19,12 +19,12 @@ from e2efly.environment import Env
 from e2efly.learning.algorithm import Algorithm, TrainState, annealed, epochs
 from e2efly.learning.critic import critic_input, gae, init_critic, value
 from e2efly.learning.networks import Actor, Layers, Weights
-from e2efly.learning.rollout import Record, RolloutState, advance
+from e2efly.learning.rollout import RolloutState, StepRecord, advance
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Parameters:
+class PPOParameters:
     """What PPO learns."""
 
     policy: Weights
@@ -45,7 +45,7 @@ class Acted:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Samples:
+class PPOSamples:
     """The samples from which the epochs learn. Each leaf is (steps, n, ...) or flat."""
 
     acted: Acted
@@ -64,7 +64,7 @@ def log_prob(z: Float[Array, "*t 4"], log_std: Float[Array | np.ndarray, "4"]) -
 class PPO(Algorithm):
     """Proximal policy optimisation; see the module."""
 
-    def init(self, env: Env, config: Any, seed: int) -> Parameters:
+    def init(self, env: Env, config: Any, seed: int) -> PPOParameters:
         """Fresh networks, made by NumPy.
 
         Raises:
@@ -76,7 +76,7 @@ class PPO(Algorithm):
                 f"({config.horizon}) and of algo.minibatch ({config.minibatch})"
             )
         rng = np.random.default_rng(seed)
-        return Parameters(
+        return PPOParameters(
             self.actor.init(rng, np.asarray(env.hover)),
             np.full(4, config.log_std, np.float32),
             init_critic(rng, self.actor, env),
@@ -95,7 +95,7 @@ class PPO(Algorithm):
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
 
     def act(
-        self, env: Env, parameters: Parameters, at: RolloutState, z: Float[Array, "n 4"]
+        self, env: Env, parameters: PPOParameters, at: RolloutState, z: Float[Array, "n 4"]
     ) -> tuple[Array, Array, Acted]:
         """The action with noise, the next recurrent state, and the data that a sample stores."""
         features = self.actor.features(at.observation, at.env.images)
@@ -105,30 +105,30 @@ class PPO(Algorithm):
         return action, memory, Acted(features, at.memory, from_here, action)
 
     def samples(
-        self, config: Any, parameters: Parameters, acted: Acted, noise: Array, next_value: Array, record: Record
-    ) -> Samples:
+        self, config: Any, parameters: PPOParameters, acted: Acted, noise: Array, next_value: Array, record: StepRecord
+    ) -> PPOSamples:
         """The samples of a rollout: advantages and value targets by GAE."""
         here = value(self.actor, parameters.critic, acted.critic_input)
         ended = record.terminated, record.done
         advantage = gae(record.reward, here, next_value, *ended, config.gamma, config.gae_lambda)
-        return Samples(acted, log_prob(noise, parameters.log_std), advantage, advantage + here, record.done)
+        return PPOSamples(acted, log_prob(noise, parameters.log_std), advantage, advantage + here, record.done)
 
     def improve(
         self,
         config: Any,
         rate: Float[Array, ""],
-        parameters: Parameters,
+        parameters: PPOParameters,
         optimizer: Any,
-        samples: Samples,
+        samples: PPOSamples,
         key: PRNGKeyArray,
-    ) -> tuple[Parameters, Any, dict[str, Array]]:
+    ) -> tuple[PPOParameters, Any, dict[str, Array]]:
         """Run epochs of minibatches over the samples of a rollout.
 
         Returns:
             The new parameters, the new state of the optimiser, and the mean losses.
         """
 
-        def loss(parameters: Parameters, batch: Samples) -> tuple[Array, dict[str, Array]]:
+        def loss(parameters: PPOParameters, batch: PPOSamples) -> tuple[Array, dict[str, Array]]:
             return _loss(self.actor, parameters, config, batch)
 
         if self.actor.network.recurrent:
@@ -137,7 +137,7 @@ class PPO(Algorithm):
 
     def _rollout(
         self, env: Env, config: Any, state: TrainState, key: PRNGKeyArray
-    ) -> tuple[Samples, RolloutState, dict[str, Array]]:
+    ) -> tuple[PPOSamples, RolloutState, dict[str, Array]]:
         parameters = state.parameters
         noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
 
@@ -146,14 +146,14 @@ class PPO(Algorithm):
             after, out = advance(env, config, at, action, memory, critic=True)
             assert out.final_privileged is not None
             to_there = critic_input(self.actor, out.final_observation, out.final_privileged)
-            return after, (acted, to_there, Record.of(out))
+            return after, (acted, to_there, StepRecord.of(out))
 
         end, (acted, to_there, record) = jax.lax.scan(step, RolloutState.of(state), noise)
         follows = value(self.actor, parameters.critic, to_there)  # for all steps at once
         return self.samples(config, parameters, acted, noise, follows, record), end, record.metrics()
 
 
-def in_pieces(samples: Samples, length: int) -> Samples:
+def in_pieces(samples: PPOSamples, length: int) -> PPOSamples:
     """Samples (steps, n, ...), cut into pieces of successive steps: (steps / length, n, length, ...)."""
 
     def cut(x: Array) -> Array:
@@ -162,7 +162,7 @@ def in_pieces(samples: Samples, length: int) -> Samples:
     return jax.tree.map(cut, samples)
 
 
-def means(actor: Actor, policy: Weights, batch: Samples) -> Float[Array, "*t 4"]:
+def means(actor: Actor, policy: Weights, batch: PPOSamples) -> Float[Array, "*t 4"]:
     """The action of the policy without noise for each sample. With a GRU, the samples are pieces (m, length, ...)."""
     acted = batch.acted
     if not actor.network.recurrent:
@@ -177,7 +177,7 @@ def means(actor: Actor, policy: Weights, batch: Samples) -> Float[Array, "*t 4"]
     return jnp.swapaxes(jax.lax.scan(step, acted.memory[:, 0], along)[1], 0, 1)
 
 
-def _loss(actor: Actor, parameters: Parameters, config: Any, batch: Samples) -> tuple[Array, dict[str, Array]]:
+def _loss(actor: Actor, parameters: PPOParameters, config: Any, batch: PPOSamples) -> tuple[Array, dict[str, Array]]:
     acted = batch.acted
     mean = means(actor, parameters.policy, batch)
     z = (acted.action - mean) * jnp.exp(-parameters.log_std)

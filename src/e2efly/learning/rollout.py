@@ -52,7 +52,7 @@ class RolloutState:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Record:
+class StepRecord:
     """The data that every rollout gathers. Each leaf is (steps, n), the terms are (steps,)."""
 
     reward: Float[Array, "*t"]
@@ -62,10 +62,10 @@ class Record:
     terms: dict[str, Float[Array, "*t"]]
 
     @staticmethod
-    def of(out: Step) -> "Record":
+    def of(out: Step) -> "StepRecord":
         """The record of one step."""
         terms = {name: jnp.mean(x) for name, x in out.terms.items()}
-        return Record(out.reward, out.terminated, out.done, out.success, terms)
+        return StepRecord(out.reward, out.terminated, out.done, out.success, terms)
 
     def metrics(self) -> dict[str, Array]:
         """Means over the rollout."""
@@ -118,7 +118,7 @@ def window(
     noise: Float[Array, "t n 4"],
     cuts: Bool[Array, " t"],
     last_noise: Float[Array, "n 4"] | None = None,
-) -> tuple[dict[str, Array], RolloutState, tuple[Any, Array, Record]]:
+) -> tuple[dict[str, Array], RolloutState, tuple[Any, Array, StepRecord]]:
     """A differentiable rollout. A critic's value is added where the window ends, where the gradient is cut, and where
     an episode times out.
 
@@ -150,7 +150,7 @@ def window(
         terms = out.terms if config.term_gradients else {"reward": out.reward}
         gain = {name: jnp.mean(at.discount * x) for name, x in terms.items()}
         gain["value"] = jnp.mean(at.discount * out.truncated * config.gamma * follows) + at_cut
-        return after, (gain, jax.lax.stop_gradient((gathered, follows, Record.of(out))))
+        return after, (gain, jax.lax.stop_gradient((gathered, follows, StepRecord.of(out))))
 
     end, (gain, gathered) = jax.lax.scan(step, start, (noise, cuts))
     gain = {name: jnp.sum(x) / config.horizon for name, x in gain.items()}

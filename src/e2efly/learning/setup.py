@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from e2efly.config import TrainConfig
 from e2efly.environment import Env
 from e2efly.learning.algorithm import Algorithm, make_algorithm
-from e2efly.learning.curriculum import Stage, stages
+from e2efly.learning.curriculum import CurriculumStage, stages
 from e2efly.learning.devices import share
 from e2efly.learning.networks import Actor
 from e2efly.learning.run_budget import check_run
@@ -19,7 +19,7 @@ class Setup:
     """The objects that a configuration defines, before anything is compiled."""
 
     config: TrainConfig
-    stages: tuple[Stage, ...]
+    stages: tuple[CurriculumStage, ...]
     """Stages of the curriculum. The last stage is the task itself."""
     algorithm: Algorithm
     actor: Actor

@@ -34,7 +34,7 @@ from e2efly.learning.rollout import RolloutState, window
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Parameters:
+class SHACParameters:
     """What SHAC learns."""
 
     policy: Weights
@@ -45,7 +45,7 @@ class Parameters:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Samples:
+class SHACSamples:
     """The samples from which the critic learns. Each leaf is (steps, n, ...) or flat."""
 
     critic_input: Float[Array, "*t c"]
@@ -55,13 +55,13 @@ class Samples:
 class SHAC(Algorithm):
     """Short-horizon actor-critic; see the module."""
 
-    def init(self, env: Env, config: SHACConfig, seed: int) -> Parameters:
+    def init(self, env: Env, config: SHACConfig, seed: int) -> SHACParameters:
         """Fresh networks, made by NumPy."""
         rng = np.random.default_rng(seed)
         policy, critic = self.actor.init(rng, np.asarray(env.hover)), init_critic(rng, self.actor, env)
-        return Parameters(policy, critic, jax.tree.map(np.copy, critic))
+        return SHACParameters(policy, critic, jax.tree.map(np.copy, critic))
 
-    def optimizer(self, config: SHACConfig, parameters: Parameters) -> dict[str, Any]:
+    def optimizer(self, config: SHACConfig, parameters: SHACParameters) -> dict[str, Any]:
         """The initial states of Adam for the policy and for the critic."""
         return {name: adam_state(config, getattr(parameters, name)) for name in ("policy", "critic")}
 
@@ -75,7 +75,7 @@ class SHAC(Algorithm):
         def gain(policy: Weights) -> tuple[dict[str, Array], Any]:
             return self._window(env, config, policy, learned.target, state, noise_key, progress)
 
-        def loss(critic: Layers, batch: Samples) -> tuple[Array, dict[str, Array]]:
+        def loss(critic: Layers, batch: SHACSamples) -> tuple[Array, dict[str, Array]]:
             error = 0.5 * jnp.mean((value(self.actor, critic, batch.critic_input) - batch.value_target) ** 2)
             return error, {"value": error}
 
@@ -86,7 +86,7 @@ class SHAC(Algorithm):
         )
         target = followed(learned.target, critic, config.target_share)
         metrics |= losses | {"loss/gradient_norm": norm, **norms}
-        parameters, optimizer = Parameters(policy, critic, target), {"policy": policy_adam, "critic": critic_adam}
+        parameters, optimizer = SHACParameters(policy, critic, target), {"policy": policy_adam, "critic": critic_adam}
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
 
     def _window(
@@ -115,5 +115,5 @@ class SHAC(Algorithm):
         gain, end, (from_here, after, record) = window(env, config, first, act, follows, noise, cuts)
         here = value(self.actor, target, from_here)
         advantage = gae(record.reward, here, after, record.terminated, record.done, config.gamma, config.td_lambda)
-        samples = jax.lax.stop_gradient(Samples(from_here, here + advantage))
+        samples = jax.lax.stop_gradient(SHACSamples(from_here, here + advantage))
         return gain, (end, samples, {"value": jnp.mean(here), **record.metrics()})

@@ -27,7 +27,7 @@ _TICK = 1_000_000
 _LENGTH = struct.Struct("<I")
 
 
-class Topic(NamedTuple):
+class BagTopic(NamedTuple):
     """A topic of a bag."""
 
     name: str
@@ -47,13 +47,13 @@ class BagFile:
         self.cut_off = ""
         """Why reading ended early. Empty at the proper end."""
 
-    def __iter__(self) -> Iterator[tuple[Topic, bytes]]:
+    def __iter__(self) -> Iterator[tuple[BagTopic, bytes]]:
         """Read the messages, in the order of the file."""
         with mapped(self.path) as data:
             expand = Expander(len(data))
             yield from self._messages(data, expand)
 
-    def _messages(self, data: bytes | mmap, expand: Expander) -> Iterator[tuple[Topic, bytes]]:
+    def _messages(self, data: bytes | mmap, expand: Expander) -> Iterator[tuple[BagTopic, bytes]]:
         if data[: len(ZSTD)] == ZSTD:
             data = expand("zstd", data[:])
         if data[: len(SQLITE)] == SQLITE:
@@ -68,19 +68,19 @@ class BagFile:
         except (ValueError, KeyError, struct.error, sqlite3.Error) as error:
             self.cut_off = f"the file is damaged from here on ({error})"
 
-    def _mcap(self, data: bytes | mmap) -> Iterator[tuple[Topic, bytes]]:
+    def _mcap(self, data: bytes | mmap) -> Iterator[tuple[BagTopic, bytes]]:
         records = McapRecords(data)
         versions = {"ros1": 1, "cdr": 2}
         for record in records:
             channel = record.channel
             if channel.encoding in versions:
                 text = str(channel.schema, "utf-8", "replace") if channel.schema_encoding.endswith("msg") else ""
-                yield Topic(channel.topic, _full(channel.kind), versions[channel.encoding], text), record.data
+                yield BagTopic(channel.topic, _full(channel.kind), versions[channel.encoding], text), record.data
         self.cut_off = records.cut_off
 
 
-def _ros1(data: bytes | mmap, expand: Expander) -> Iterator[tuple[Topic, bytes]]:
-    topics: dict[bytes, Topic] = {}
+def _ros1(data: bytes | mmap, expand: Expander) -> Iterator[tuple[BagTopic, bytes]]:
+    topics: dict[bytes, BagTopic] = {}
     for header, content in _records(data, len(ROS1)):
         op = header.get(b"op")
         if op == b"\5":
@@ -91,7 +91,7 @@ def _ros1(data: bytes | mmap, expand: Expander) -> Iterator[tuple[Topic, bytes]]
             if head.get(b"op") == b"\7":
                 about = _fields(message)
                 kind, text = (str(about[key], "utf-8", "replace") for key in (b"type", b"message_definition"))
-                topics[head[b"conn"]] = Topic(str(head[b"topic"], "utf-8", "replace"), _full(kind), 1, text)
+                topics[head[b"conn"]] = BagTopic(str(head[b"topic"], "utf-8", "replace"), _full(kind), 1, text)
             elif head.get(b"op") == b"\2":
                 yield topics[head[b"conn"]], message
 
@@ -128,7 +128,7 @@ def _prefixed(data: bytes | mmap, at: int) -> tuple[bytes, int]:
     return data[at : at + size], at + size
 
 
-def _sqlite(path: Path, data: bytes | mmap) -> Iterator[tuple[Topic, bytes]]:
+def _sqlite(path: Path, data: bytes | mmap) -> Iterator[tuple[BagTopic, bytes]]:
     """The messages of a sqlite3 file. `data` is its content, expanded if it was compressed."""
     size, steps = len(data), 0
 
@@ -154,7 +154,7 @@ def _sqlite(path: Path, data: bytes | mmap) -> Iterator[tuple[Topic, bytes]]:
         known = "topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
         texts = dict(base.execute(f"SELECT {known}")) if "encoding" in columns else {}
         topics = {
-            number: Topic(str(name), _full(str(kind)), 2, str(texts.get(kind) or ""))
+            number: BagTopic(str(name), _full(str(kind)), 2, str(texts.get(kind) or ""))
             for number, name, kind, form in base.execute("SELECT id, name, type, serialization_format FROM topics")
             if form == "cdr"
         }

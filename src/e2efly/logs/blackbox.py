@@ -68,7 +68,7 @@ class Blackbox:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class LogClock:
     """How a blackbox log is aligned with a flight log."""
 
     time: np.ndarray
@@ -203,7 +203,7 @@ def _session(parser: Any, number: int) -> Blackbox:
     )
 
 
-def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> Alignment:
+def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> LogClock:
     """Align a blackbox log with a flight log's clock by the measurements of both gyros.
 
     The windows with the most motion are searched for in the whole flight. From the best match, the neighbouring windows
@@ -248,11 +248,11 @@ def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> Alignment:
     return _alignment(time, gyro, blackbox, blackbox.time + np.interp(blackbox.time, middle, offset))
 
 
-def _alignment(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox, moved: np.ndarray) -> Alignment:
+def _alignment(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox, moved: np.ndarray) -> LogClock:
     inside = (time >= moved[0]) & (time <= moved[-1])
     other = np.stack([np.interp(time[inside], moved, blackbox.gyro[:, i]) for i in _AXES], axis=1)
     size = math.sqrt(float(np.sum(gyro[inside] ** 2)) * float(np.sum(other**2)))
-    return Alignment(
+    return LogClock(
         time=moved,
         correlation=float(np.sum(gyro[inside] * other)) / size if size else 0.0,
         overlap=float(np.ptp(time[inside])) if inside.any() else 0.0,

@@ -23,7 +23,7 @@ _RECORD, _MESSAGE_HEAD, _CHUNK_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ
 _SHORT, _LONG = struct.Struct("<I"), struct.Struct("<Q")  # numbers of bytes
 
 
-class Channel(NamedTuple):
+class McapChannel(NamedTuple):
     """What the messages of a channel are."""
 
     topic: str
@@ -38,7 +38,7 @@ class Channel(NamedTuple):
 class Message(NamedTuple):
     """One message."""
 
-    channel: Channel
+    channel: McapChannel
     number: int
     """Its sequence number."""
     stamp: int
@@ -61,7 +61,7 @@ class McapRecords:
         """Why reading ended early. Empty at the proper end."""
         self._data, self._expand = data, Expander(len(data))
         self._schemas: dict[int, tuple[str, str, bytes]] = {}
-        self._channels: dict[int, Channel] = {}
+        self._channels: dict[int, McapChannel] = {}
 
     def __iter__(self) -> Iterator[Message]:
         """Read the messages in the order of the file."""
@@ -108,7 +108,7 @@ class McapRecords:
                 topic, then = _text(content, 4)
                 encoding, _ = _text(content, then)
                 known = self._schemas[schema] if schema else ("", "", b"")
-                self._channels[number] = Channel(topic, encoding, *known)
+                self._channels[number] = McapChannel(topic, encoding, *known)
             elif inside:
                 raise ValueError(f"record of kind {opcode} in a chunk")
             elif opcode == _HEADER:

@@ -26,7 +26,7 @@ _PART = re.compile(r"(?P<name>.+):(?P<begin>\d+(\.\d+)?)-(?P<end>\d+(\.\d+)?)")
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogReading:
     """How logs are read."""
 
     columns: Mapping[str, Column] = field(default_factory=dict)
@@ -54,10 +54,10 @@ class Format(NamedTuple):
     name: str
     begins: Callable[[bytes], bool]
     """Whether a file with this beginning has the format."""
-    read: Callable[[Path, Reading], list[Record]]
+    read: Callable[[Path, LogReading], list[Record]]
 
 
-def read_flights(path: Path, reading: Reading | None = None) -> list[Record]:
+def read_flights(path: Path, reading: LogReading | None = None) -> list[Record]:
     """The flights of a log. A blackbox can contain several.
 
     Args:
@@ -68,7 +68,7 @@ def read_flights(path: Path, reading: Reading | None = None) -> list[Record]:
         ValueError: naming the file, what is wrong with it and what is accepted. No other error comes from the content
             of a file.
     """
-    reading = reading or Reading()
+    reading = reading or LogReading()
     form = format_of(path)
     try:
         with np.errstate(all="ignore"):  # of damaged numbers; what is not finite is left out
@@ -146,7 +146,7 @@ ACCEPTED = (
 )
 
 
-def _finished(record: Record, reading: Reading) -> Record:
+def _finished(record: Record, reading: LogReading) -> Record:
     """A record as the options ask for it."""
     if record.duration > LONGEST:
         raise ValueError(
@@ -180,7 +180,7 @@ def _mapped(streams: Mapping[str, Stream], columns: Mapping[str, Column], notes:
     return changed
 
 
-def read_part(path: Path, reading: Reading | None = None) -> list[Record]:
+def read_part(path: Path, reading: LogReading | None = None) -> list[Record]:
     """The flights of a log. For LOG:BEGIN-END, only the part between these two times, s after the start of the log.
 
     Raises:

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Kind:
+class StreamKind:
     """One stream that a record may have."""
 
     columns: tuple[str, ...]
@@ -19,22 +19,22 @@ class Kind:
     """Description, with the frame."""
 
 
-KINDS: dict[str, Kind] = {
-    "position": Kind(("px", "py", "pz"), "m", "centre of mass, world"),
-    "velocity": Kind(("vx", "vy", "vz"), "m/s", "world"),
-    "quaternion": Kind(("qw", "qx", "qy", "qz"), "1", "attitude, wxyz, body to world"),
-    "body_rate": Kind(("wx", "wy", "wz"), "rad/s", "about body x, y, z"),
-    "specific_force": Kind(("ax", "ay", "az"), "m/s^2", "accelerometer, body: (0, 0, 9.81) at rest"),
-    "rotor_speed": Kind(("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file"),
-    "motor": Kind(("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the order of the vehicle's file"),
-    "command": Kind(
+KINDS: dict[str, StreamKind] = {
+    "position": StreamKind(("px", "py", "pz"), "m", "centre of mass, world"),
+    "velocity": StreamKind(("vx", "vy", "vz"), "m/s", "world"),
+    "quaternion": StreamKind(("qw", "qx", "qy", "qz"), "1", "attitude, wxyz, body to world"),
+    "body_rate": StreamKind(("wx", "wy", "wz"), "rad/s", "about body x, y, z"),
+    "specific_force": StreamKind(("ax", "ay", "az"), "m/s^2", "accelerometer, body: (0, 0, 9.81) at rest"),
+    "rotor_speed": StreamKind(("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file"),
+    "motor": StreamKind(("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the vehicle file's order"),
+    "command": StreamKind(
         ("cmd_thrust", "cmd_wx", "cmd_wy", "cmd_wz"), "m/s^2, rad/s",
         "thrust over mass and body rates (command mode ctbr) that were sent, each held until the next",
     ),
-    "setpoint": Kind(
+    "setpoint": StreamKind(
         ("set_wx", "set_wy", "set_wz"), "rad/s", "body rates that the flight controller's rate loop was asked for",
     ),
-    "voltage": Kind(("volts",), "V", "of the whole battery"),
+    "voltage": StreamKind(("volts",), "V", "of the whole battery"),
 }  # fmt: skip
 """All streams, by name."""
 

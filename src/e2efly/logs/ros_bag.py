@@ -12,7 +12,7 @@ import numpy as np
 
 from e2efly.config.names import unknown
 from e2efly.control import Quat, Vec3
-from e2efly.logs.bag_storage import BEGINNINGS, BagFile, Topic
+from e2efly.logs.bag_storage import BEGINNINGS, BagFile, BagTopic
 from e2efly.logs.recording import Record, Streams, listed
 from e2efly.logs.scripts.ros_topics import BODY_FRAME
 from e2efly.logs.ulog import ORDER, RPM, TAKEN, TIMES, put_topic
@@ -117,7 +117,7 @@ POSES = ("position", "quaternion", "velocity")
 class _Series:
     """The messages of a topic, as numbers."""
 
-    topic: Topic
+    topic: BagTopic
     damaged: int = 0
     """Messages that cannot be decoded."""
     rows: dict[str, tuple[int, array]] = field(default_factory=dict)
@@ -208,7 +208,7 @@ def read_bag(path: Path, topics: Sequence[str] = ()) -> Record:
         raise ValueError(
             f"{path}: the package rosbags is missing ({error}); accepted: pip install 'e2efly[ros]'"
         ) from None
-    streams, known, others = Streams(), dict[Topic, _Series](), dict[Topic, str]()
+    streams, known, others = Streams(), dict[BagTopic, _Series](), dict[BagTopic, str]()
     for file in _files(path):
         _read(file, known, others)
         if file.cut_off:
@@ -242,7 +242,7 @@ def _files(path: Path) -> list[BagFile]:
     return found
 
 
-def _read(file: BagFile, known: dict[Topic, "_Series"], others: dict[Topic, str]) -> None:
+def _read(file: BagFile, known: dict[BagTopic, "_Series"], others: dict[BagTopic, str]) -> None:
     """Decode the messages of a file that can be used. `others` gets the topics that cannot, and why."""
     count = 0
     for topic, data in file:
@@ -267,7 +267,7 @@ def _read(file: BagFile, known: dict[Topic, "_Series"], others: dict[Topic, str]
             return
 
 
-def _refused(topic: Topic) -> str:
+def _refused(topic: BagTopic) -> str:
     """Why a topic cannot be used. Empty: it may be."""
     if topic.kind not in TYPES and topic.kind not in PX4:
         return topic.kind
@@ -315,7 +315,7 @@ def _store(version: int) -> Any:
 
 
 @lru_cache(maxsize=32)
-def _store_of(topic: Topic) -> Any:
+def _store_of(topic: BagTopic) -> Any:
     """The types that a topic needs: the known ones, and what the bag defines beside them."""
     from rosbags.typesys import get_types_from_msg
 

@@ -46,7 +46,7 @@ class Array:
 
 
 @dataclass(frozen=True)
-class Node:
+class GraphNode:
     """A node whose operands are known."""
 
     given: tuple[Array, ...]
@@ -187,7 +187,7 @@ def _made(message: Message, known: Mapping[str, Array]) -> Made:
         raise ValueError(f"reads {missing[0]!r:.80}; accepted: an input, a constant, or what a node before it computes")
     if len(names) not in inputs:
         raise ValueError(f"has {len(names)} inputs; accepted: {' or '.join(map(str, inputs))}")
-    node = Node(tuple(known[name] for name in names), found, len(message.get("output", [])))
+    node = GraphNode(tuple(known[name] for name in names), found, len(message.get("output", [])))
     made, work = infer(node)
     if len(made) != node.outputs:
         raise ValueError(f"has {node.outputs} outputs; accepted: {len(made)}")
@@ -199,24 +199,24 @@ def _each(shape: Shape, kind: str = FLOAT) -> Made:
     return (Array(shape, type=kind),), math.prod(shape)
 
 
-def _unary(node: Node) -> Made:
+def _unary(node: GraphNode) -> Made:
     return _each(node.computed.shape)
 
 
-def _binary(node: Node) -> Made:
+def _binary(node: GraphNode) -> Made:
     return _each(_common(node, node.given))
 
 
-def _greater(node: Node) -> Made:
+def _greater(node: GraphNode) -> Made:
     return _each(_common(node, node.given), TRUTH)
 
 
-def _where(node: Node) -> Made:
+def _where(node: GraphNode) -> Made:
     node.need(node.given[0].type == TRUTH, "first, what Greater computes")
     return _each(_common(node, node.given, chosen=True))
 
 
-def _common(node: Node, given: Sequence[Array], chosen: bool = False) -> Shape:
+def _common(node: GraphNode, given: Sequence[Array], chosen: bool = False) -> Shape:
     """The common shape of operands that are extended to it. No axis of a constant meets the batch axis."""
     computed = [array.shape for array in given if array.value is None]
     node.need(all(array.type == FLOAT for array in given[chosen:]), "of float32")
@@ -231,26 +231,26 @@ def _common(node: Node, given: Sequence[Array], chosen: bool = False) -> Shape:
     return tuple(next(iter(axis), 1) for axis in sizes)
 
 
-def _clip(node: Node) -> Made:
+def _clip(node: GraphNode) -> Made:
     low, high = node.constant(1), node.constant(2)
     node.need(low.shape == high.shape == () and bool(low <= high), "an array and two rising numbers")
     return _each(node.computed.shape)
 
 
-def _gemm(node: Node) -> Made:
+def _gemm(node: GraphNode) -> Made:
     weight, bias = node.constant(1, 2).shape, node.constant(2, 1).shape
     node.need(node.computed.shape == weight[:1] and bias == weight[1:], "(k,), (k, n) and (n,)")
     return (Array(bias),), math.prod(weight) + weight[1]
 
 
-def _matmul(node: Node) -> Made:
+def _matmul(node: GraphNode) -> Made:
     x, y = node.computed, node.given[1]
     node.need(y.value is None and y.type == FLOAT, "two computed ones")
     node.need(len(x.shape) == len(y.shape) == 2 and x.shape[1] == y.shape[0], "(m, k) and (k, n)")
     return (Array((x.shape[0], y.shape[1])),), math.prod(x.shape) * y.shape[1]
 
 
-def _gather(node: Node) -> Made:
+def _gather(node: GraphNode) -> Made:
     x, places = node.computed.shape, node.constant(1, 1, INTEGER)
     node.need(len(x) == 1, "(k,), of which it takes columns")
     if places.size and not 0 <= places.min() <= places.max() < x[0]:
@@ -258,7 +258,7 @@ def _gather(node: Node) -> Made:
     return _each(places.shape)
 
 
-def _reshape(node: Node) -> Made:
+def _reshape(node: GraphNode) -> Made:
     x, wanted = node.computed.shape, [int(size) for size in node.constant(1, 1, INTEGER)]
     node.need(wanted[:1] == [0] and all(size != 0 or i <= len(x) for i, size in enumerate(wanted)), "a shape (0, ...)")
     shape = tuple(x[i] if size == 0 else size for i, size in enumerate(wanted[1:]))
@@ -266,32 +266,32 @@ def _reshape(node: Node) -> Made:
     return _each(shape)
 
 
-def _transpose(node: Node) -> Made:
+def _transpose(node: GraphNode) -> Made:
     x, order = node.computed.shape, node.attributes["perm"]
     node.need(sorted(order) == list(range(len(x) + 1)) and order[0] == 0, "perm with the batch axis first")
     return _each(tuple(x[i - 1] for i in order[1:]))
 
 
-def _concat(node: Node) -> Made:
+def _concat(node: GraphNode) -> Made:
     parts = [array.shape for array in node.given]
     node.need(all(array.value is None and array.type == FLOAT for array in node.given), "computed ones")
     node.need(all(parts) and len({shape[1:] for shape in parts}) == 1, "equal sizes but for the first")
     return _each((sum(shape[0] for shape in parts), *parts[0][1:]))
 
 
-def _split(node: Node) -> Made:
+def _split(node: GraphNode) -> Made:
     x, count = node.computed.shape, node.outputs
     node.need(bool(x) and count > 0 and x[0] % count == 0, "a first size that is a multiple of the outputs")
     return (Array((x[0] // count, *x[1:])),) * count, math.prod(x)
 
 
-def _norm(node: Node) -> Made:
+def _norm(node: GraphNode) -> Made:
     x = node.computed.shape
     node.need(node.attributes["axes"] == list(range(1, len(x) + 1)), "all axes after the batch axis")
     return (Array((1,) * len(x)),), math.prod(x)
 
 
-def _places(node: Node) -> tuple[int, int]:
+def _places(node: GraphNode) -> tuple[int, int]:
     """The number of rows and columns at which a window lies in an image (c, h, w)."""
     x, sides, strides = node.computed.shape, node.attributes["kernel_shape"], node.attributes["strides"]
     node.need(len(x) == 3 and len(sides) == len(strides) == 2 and min(*sides, *strides) > 0, "a window of an image")
@@ -300,12 +300,12 @@ def _places(node: Node) -> tuple[int, int]:
     return rows, columns
 
 
-def _pool(node: Node) -> Made:
+def _pool(node: GraphNode) -> Made:
     shape = (node.computed.shape[0], *_places(node))
     return (Array(shape),), math.prod(shape) * math.prod(node.attributes["kernel_shape"])
 
 
-def _convolution(node: Node) -> Made:
+def _convolution(node: GraphNode) -> Made:
     kernel, bias, places = node.constant(1, 4).shape, node.constant(2, 1).shape, _places(node)
     node.need(kernel[1:] == (node.computed.shape[0], *node.attributes["kernel_shape"]), "a kernel of its channels")
     node.need(bias == kernel[:1], "a bias of (n,)")
@@ -313,7 +313,7 @@ def _convolution(node: Node) -> Made:
 
 
 _WINDOW: dict[str, Any] = {"kernel_shape": list, "strides": list}
-OPERATORS: dict[str, tuple[Callable[[Node], Made], Sequence[int], dict[str, Any]]] = {
+OPERATORS: dict[str, tuple[Callable[[GraphNode], Made], Sequence[int], dict[str, Any]]] = {
     **dict.fromkeys(("Identity", "Log", "Relu", "Sigmoid", "Softplus", "Tanh"), (_unary, (1,), {})),
     "Elu": (_unary, (1,), {"alpha": 1.0}),
     "LeakyRelu": (_unary, (1,), {"alpha": 0.01}),

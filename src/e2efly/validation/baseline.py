@@ -23,7 +23,7 @@ from e2efly.vehicles.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
-class Memory:
+class BaselineMemory:
     """The state that one call of a baseline passes to the next."""
 
     controller: Any
@@ -81,8 +81,8 @@ class Baseline:
         return Baseline(contract, goal, hover_controller(name, vehicle, latency, period), vehicle)
 
     def act(
-        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: Memory | None = None
-    ) -> tuple[np.ndarray, Memory]:
+        self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: BaselineMemory | None = None
+    ) -> tuple[np.ndarray, BaselineMemory]:
         """The actions for observations, and the memory for the next call.
 
         The heading is free if the task's goal gives none. The measured acceleration is the change of the observed
@@ -110,7 +110,7 @@ class Baseline:
         command = np.stack(np.broadcast_arrays(wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z), axis=-1)
         command = np.clip(command, self.contract.action.low, self.contract.action.high)
         given = Ctbr(command[..., 0], Vec3.of(command[..., 1:]))
-        return self.contract.action.asking(command), Memory(known, under_way, given, velocity)
+        return self.contract.action.asking(command), BaselineMemory(known, under_way, given, velocity)
 
 
 def _aims(goal: type[Goal]) -> bool:

@@ -39,7 +39,7 @@ def loop_rate(control_rate: float) -> float:
 
 
 @dataclass
-class Flown:
+class FlownSession:
     """The true record of a flight, sampled at every control step."""
 
     time: list[float] = field(default_factory=list)
@@ -115,7 +115,7 @@ class Session:
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
             filter=Filter.of(vehicle, settings.fence, late) if filtered else None, hover=hover,
         )  # fmt: skip
-        self.flown = Flown()
+        self.flown = FlownSession()
         self.lateness = 0.0
         """Lateness that is reported to the bridge at the next step, s."""
 

@@ -15,7 +15,7 @@ from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.flight.settings import FlightSettings
 from e2efly.logs.recording import Record, Stream
 from e2efly.policy.odometry import Sample
-from e2efly.validation.bridge_session import Flown, Session
+from e2efly.validation.bridge_session import FlownSession, Session
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import BLACKBOX, Rig
@@ -32,7 +32,7 @@ the rig holds."""
 class Excited:
     """The result of the flight."""
 
-    flown: Flown
+    flown: FlownSession
     """The record of the whole flight."""
     complete: bool
     """Whether it took off, had its whole time, hovered, landed and was disarmed."""

@@ -32,7 +32,7 @@ CHUNK = 5
 
 
 @dataclass(frozen=True)
-class Mission:
+class FleetMission:
     """What all flights share."""
 
     policy: Path
@@ -71,7 +71,7 @@ class Mission:
 
 
 @dataclass(frozen=True)
-class Flight:
+class FleetFlight:
     """One flight of a mission."""
 
     start: RigidState
@@ -85,8 +85,8 @@ class Flight:
 
 
 def fly_all(
-    mission: Mission,
-    flights: Sequence[Flight],
+    mission: FleetMission,
+    flights: Sequence[FleetFlight],
     done: Callable[[int], None] = lambda count: None,
     processes: int | None = None,
 ) -> list[Trajectory]:
@@ -129,11 +129,11 @@ def _collect(flown: Iterator[Trajectory], done: Callable[[int], None]) -> list[T
     return trajectories
 
 
-def _fly_chunk(mission: Mission, flights: Sequence[Flight]) -> list[Trajectory]:
+def _fly_chunk(mission: FleetMission, flights: Sequence[FleetFlight]) -> list[Trajectory]:
     return list(_fly(mission, flights))
 
 
-def _fly(mission: Mission, flights: Sequence[Flight]) -> Iterator[Trajectory]:
+def _fly(mission: FleetMission, flights: Sequence[FleetFlight]) -> Iterator[Trajectory]:
     policy, kind = mission.acting(), mission.kind()
     names = [image.name for image in policy.contract.images]
     with closing(kind.of(mission.believed, policy.contract)) as plant:

@@ -33,7 +33,7 @@ class FlightController:
         self._vehicle, self._by_rates, self._controller = vehicle, command_mode == "ctbr", mode.controller
         self._low, self._high = vehicle.thrust_range
         self._unit = self._high if mode.of_largest else 1.0
-        self._loop = RateLoop(vehicle, plain_mixer)
+        self._loop = PlainRateLoop(vehicle, plain_mixer)
 
     def start(self, body_rate: Numbers) -> None:
         """Reset the integrals and settle the filter of the body rates."""
@@ -57,7 +57,7 @@ class FlightController:
         return self._loop.thrusts(command, motion[3:], dt)
 
 
-class RateLoop:
+class PlainRateLoop:
     """The rate loop and the mixer, from collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
 
     torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w. The mixer gives attitude priority

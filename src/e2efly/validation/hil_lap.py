@@ -82,7 +82,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Change:
+class SceneChange:
     """A change of the bridge's mode."""
 
     time: float
@@ -109,7 +109,7 @@ class Lap:
     """Duration of the policy's flight, s."""
     top_speed: float = 0.0
     """Largest speed of the policy, m/s."""
-    changes: tuple[Change, ...] = ()
+    changes: tuple[SceneChange, ...] = ()
     """The bridge's changes of mode."""
     pose_to_image: Spread = Spread()
     """Time from the arrival of the newest pose at the HIL node to the image, s."""
@@ -219,11 +219,11 @@ def clock_of(log: FlightLog) -> float:
     )
 
 
-def changes_of(log: FlightLog) -> tuple[Change, ...]:
+def changes_of(log: FlightLog) -> tuple[SceneChange, ...]:
     """The bridge's changes of mode, from its log."""
     shift, modes = clock_of(log), log["mode"]
     return tuple(
-        Change(1e-9 * float(stamp) - shift, str(message["mode"]), tuple(map(str, message.get("reasons") or ())))
+        SceneChange(1e-9 * float(stamp) - shift, str(message["mode"]), tuple(map(str, message.get("reasons") or ())))
         for stamp, message in zip(modes.stamp, modes.values, strict=True)
     )
 
@@ -312,7 +312,7 @@ def _to_stick(log: FlightLog) -> np.ndarray:
     return (timing.numbers("lateness_s") + timing.numbers("work_s"))[asked]
 
 
-def _window(changes: tuple[Change, ...], heard: Heard) -> tuple[float, float]:
+def _window(changes: tuple[SceneChange, ...], heard: Heard) -> tuple[float, float]:
     """Begin and end of the policy's flight from the log, or from the notes if the log ends too early."""
     begin = next((c.time for c in changes if c.mode == "policy"), heard.began)
     end = next((c.time for c in changes if c.time > begin), heard.ended)

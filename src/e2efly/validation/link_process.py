@@ -25,7 +25,7 @@ LOOK_S = 0.001
 _LARGEST = 65536
 
 
-class Line:
+class DelayLine:
     """Bytes in transit. `now` is any steady clock, s, the same in both methods."""
 
     def __init__(self, delay: float) -> None:
@@ -56,11 +56,11 @@ def serve(listener: socket.socket, port: int, delay: float) -> None:
         with bridge, socket.create_connection(("127.0.0.1", port)) as firmware:
             for end in (bridge, firmware):
                 end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            if not _carry(bridge, firmware, Line(delay)):
+            if not _carry(bridge, firmware, DelayLine(delay)):
                 return
 
 
-def _carry(bridge: socket.socket, firmware: socket.socket, line: Line) -> bool:
+def _carry(bridge: socket.socket, firmware: socket.socket, line: DelayLine) -> bool:
     """Forward one connection until either end closes it. False if standard input has ended."""
     while True:
         readable, _, _ = select.select([bridge, firmware, sys.stdin], [], [], LOOK_S)

@@ -61,7 +61,7 @@ def measured(pose: dict[str, Any], random: np.random.Generator) -> dict[str, Any
 
 
 @dataclass
-class Camera:
+class MocapCamera:
     """Delays poses, adds noise to them, and drops some. `now` is any steady clock, s, the same in both methods."""
 
     marks: Marks
@@ -88,7 +88,7 @@ class Camera:
         return ready
 
 
-def serve(inlet: socket.socket, ports: list[int], camera: Camera) -> None:
+def serve(inlet: socket.socket, ports: list[int], camera: MocapCamera) -> None:
     """Forward poses until standard input ends."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         while True:
@@ -114,7 +114,7 @@ def main() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as inlet:
         inlet.bind(("127.0.0.1", 0))
         print(json.dumps({"from": inlet.getsockname()[1]}), flush=True)
-        serve(inlet, options.to, Camera(Marks(options.delay, options.gaps), np.random.default_rng(options.seed)))
+        serve(inlet, options.to, MocapCamera(Marks(options.delay, options.gaps), np.random.default_rng(options.seed)))
 
 
 if __name__ == "__main__":

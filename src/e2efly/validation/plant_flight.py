@@ -14,7 +14,7 @@ from e2efly.vehicles.gravity import GRAVITY
 
 
 @dataclass(frozen=True)
-class Sample:
+class FlightSample:
     """A moment of a flight, for a log."""
 
     time: float
@@ -25,10 +25,10 @@ class Sample:
     """(4,) rad/s. NaN if the plant does not give rotor speeds."""
 
     @staticmethod
-    def of(plant: Plant, time: float) -> "Sample":
+    def of(plant: Plant, time: float) -> "FlightSample":
         """The sample of a plant now."""
         speed = np.asarray(getattr(plant, "rotor_speed", np.full(4, np.nan)), np.float64)
-        return Sample(time, RigidState.of(plant.state), speed.copy())
+        return FlightSample(time, RigidState.of(plant.state), speed.copy())
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Trajectory:
     """Why the task failed in flight. Empty: it did not fail."""
     fault: str = ""
     """Why the flight ended early, if the policy or the plant could not go on."""
-    samples: tuple[Sample, ...] = ()
+    samples: tuple[FlightSample, ...] = ()
     """Moments between control steps, if they were requested."""
 
 
@@ -101,7 +101,7 @@ def fly(
     delay = Delay.of(latency, hover)
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
-    samples = [] if sample is None else [Sample.of(plant, 0.0)]
+    samples = [] if sample is None else [FlightSample.of(plant, 0.0)]
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
         now, then = k * period, (k + 1) * period
@@ -123,7 +123,7 @@ def fly(
                     plant.step(command, seconds / count)
                     at += seconds / count
                     if sample is not None:
-                        samples.append(Sample.of(plant, at))
+                        samples.append(FlightSample.of(plant, at))
             reached = RigidState.of(plant.state)
         except (ValueError, OSError) as error:
             fault = f"after {now:.2f} s: {error}"

@@ -39,14 +39,14 @@ class Sight:
     seed: int
     """Seed of the noise."""
 
-    def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "Watch":
+    def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "PlantWatch":
         """The watch for a flight that begins.
 
         Args:
             taken: for the plant's own cameras: by the camera's number, a function from the time since the start, s, to
                 the newest image. None: all images are rendered.
         """
-        return Watch(self, taken or {})
+        return PlantWatch(self, taken or {})
 
     def shutter(self, i: int) -> Shutter:
         """The exposure times of camera `i`."""
@@ -59,7 +59,7 @@ class Sight:
 
 
 @dataclass
-class Watch:
+class PlantWatch:
     """The images of a flight, from control step to control step."""
 
     sight: Sight

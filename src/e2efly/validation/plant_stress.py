@@ -11,10 +11,10 @@ import numpy as np
 
 from e2efly.config.budget import check_memory
 from e2efly.environment import UNSEEN, disturbance, random_key
-from e2efly.environment.stress_rows import ROWS, Draw, Row, check_rows, check_seen, rows_for
+from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation.evaluation import SEED, settling
-from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_validation import SAMPLE, flyable, plant_name
 from e2efly.validation.reality import Air, Reality, check_realities
@@ -92,8 +92,8 @@ def stress(
             drawn = draws(ROWS[row], flown, seed, episodes)
             meets = realities(drawn, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
-            asked += [Flight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
-        mission = Mission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
+            asked += [FleetFlight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
+        mission = FleetMission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
         total = len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):
@@ -101,7 +101,7 @@ def stress(
     return Report(found, seed, report, plant=kind.name, left_out={} if rows else left_out)
 
 
-def lacking(kind: type[Plant], row: Row) -> str:
+def lacking(kind: type[Plant], row: StressRow) -> str:
     """The changes that a row requires and a plant cannot make. Empty: there are none."""
     return ", ".join(sorted(row.alters - kind.alters))
 

@@ -19,7 +19,7 @@ from e2efly.policy.runtime import check
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import fields_of
 from e2efly.validation.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria, settling
-from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.log import SAMPLE, record_of
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_flight import Trajectory
@@ -198,11 +198,11 @@ def validate(
         env = found.environment(suite)
         starts = draw_starts(env, episodes, seed)
         sample = None if log is None else SAMPLE
-        mission = Mission(
+        mission = FleetMission(
             found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample, baseline
         )
         begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
-        asked = [Flight(start, course, reality, sight) for start, course, sight in begins]
+        asked = [FleetFlight(start, course, reality, sight) for start, course, sight in begins]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
         if log is not None:
             _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)

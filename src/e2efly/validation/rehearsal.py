@@ -15,7 +15,7 @@ from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.runtime import Acting, RuntimeState
 from e2efly.tasks.route import course_for, route_of
-from e2efly.validation.bridge_session import Flown, Session, rehearsal_settings
+from e2efly.validation.bridge_session import FlownSession, Session, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
@@ -65,7 +65,7 @@ class Rehearsal:
     """Times at which it reached a goal, such as a gate, s from its start."""
     told: str
     """How the policy did, as text."""
-    flown: Flown
+    flown: FlownSession
     """The record of the flight."""
 
 
@@ -158,7 +158,7 @@ def _fly(
 
 def _report(
     course: Course,
-    flown: Flown,
+    flown: FlownSession,
     up: bool,
     begun: bool,
     done: bool,
@@ -206,7 +206,7 @@ def _heading(course: Course, random: np.random.Generator) -> float:
     return course.heading + course.origin.yaw + random.uniform(-ASKEW, ASKEW)
 
 
-def _hover_error(flown: Flown) -> float:
+def _hover_error(flown: FlownSession) -> float:
     """Mean error over the last second of the hover before the policy, m."""
     end = next((at for at, mode, _ in flown.changes if mode == Mode.POLICY), flown.time[-1])
     rows = zip(flown.time, flown.mode, flown.position, flown.goal, strict=True)

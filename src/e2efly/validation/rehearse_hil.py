@@ -63,7 +63,7 @@ none."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class RehearsalPlan:
     """The settings of a rehearsal."""
 
     found: Candidate
@@ -112,7 +112,7 @@ class Drawn:
     """The course that the bridge makes from the route."""
 
 
-def draw(plan: Plan, seed: int, track: Path) -> Drawn:
+def draw(plan: RehearsalPlan, seed: int, track: Path) -> Drawn:
     """The world of a seed, as `e2efly hil` draws it, and the course in it.
 
     Args:
@@ -146,7 +146,7 @@ def draw(plan: Plan, seed: int, track: Path) -> Drawn:
     return Drawn(scenery, route, course)
 
 
-def rehearse(plan: Plan, seed: int, folder: Path, kill: Victim | None = None) -> Lap:
+def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None = None) -> Lap:
     """Fly one flight, from take-off to landing, in separate processes.
 
     Args:
@@ -196,7 +196,9 @@ def unlike(lap: Lap) -> list[str]:
 class _Flight:
     """The processes of one flight, and the pilot."""
 
-    def __init__(self, plan: Plan, drawn: Drawn, seed: int, folder: Path, heard: Heard, stack: ExitStack) -> None:
+    def __init__(
+        self, plan: RehearsalPlan, drawn: Drawn, seed: int, folder: Path, heard: Heard, stack: ExitStack
+    ) -> None:
         self.plan, self.drawn, self.folder, self.heard = plan, drawn, folder, heard
         self.random = np.random.default_rng([seed, 2])
         contract, cores = plan.found.policy.contract, sorted(os.sched_getaffinity(0))

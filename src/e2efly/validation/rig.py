@@ -20,7 +20,7 @@ from e2efly.policy.odometry import Sample
 from e2efly.simulation.device import compute_at_once, one_core
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.sitl import FirmwareState, Sitl
-from e2efly.validation.world import Body, World
+from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.002
@@ -132,7 +132,7 @@ class Rig:
         self.thrust_shares = np.ones(4)
         """Thrust of each rotor divided by the thrust from the vehicle's thrust map."""
         self.carry(vehicle)
-        self.state: Body = self.world.at_rest()
+        self.state: FlownBody = self.world.at_rest()
         self.transmitter = Transmitter()
         self.latency = latency
         """Age of the poses when they are delivered, s."""
@@ -234,10 +234,10 @@ class Rig:
             self._next_pose += self._pose_period
             self._poses.append(self._sample(now))
 
-    def _moved(self, motors: np.ndarray, dt: float) -> Body:
+    def _moved(self, motors: np.ndarray, dt: float) -> FlownBody:
         return self.world.advance(self.state, motors * self.shares, dt, self.wind, self.thrust_shares)
 
-    def _shaken(self, sensed: FirmwareState, after: Body) -> FirmwareState:
+    def _shaken(self, sensed: FirmwareState, after: FlownBody) -> FirmwareState:
         if not after.rotor_speed.any():
             return sensed
         noise = VIBRATION * self._shaking.standard_normal(3)

@@ -42,7 +42,7 @@ to 1; lag of the room behind the machine's clock, s."""
 
 
 @dataclass(frozen=True)
-class State:
+class RoomState:
     """The true state, and the events since the process began."""
 
     time: float
@@ -86,11 +86,11 @@ class _Watch:
             moving = (*state.position.tolist(), *state.velocity.tolist(), *state.quaternion.tolist())
             self.rows.append([at, *moving, motor, time.monotonic() - at])
 
-    def state(self) -> State:
+    def state(self) -> RoomState:
         rig = self.rig
         s = rig.state
         (x, y, z), (u, v, w) = s.position.tolist(), s.velocity.tolist()
-        return State(
+        return RoomState(
             rig.now(), (x, y, z), (u, v, w), tilt_of(s.quaternion), yaw_of(s.quaternion),
             tuple(rig.sitl.motors().tolist()), z <= self._feet, self.largest_tilt, tuple(self.touches),
         )  # fmt: skip

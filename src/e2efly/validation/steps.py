@@ -37,7 +37,7 @@ CLIMB_S = 6.0
 
 
 @dataclass(frozen=True)
-class Step:
+class SetpointStep:
     """A change of one of the four commands, from rest."""
 
     time: float
@@ -101,7 +101,7 @@ class _Hand:
         return np.array([wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z], float)
 
 
-def fly_steps(rig: Rig, shares: tuple[float, ...] = (1.0, -1.0, 0.6, -0.6)) -> tuple[Record, list[Step]]:
+def fly_steps(rig: Rig, shares: tuple[float, ...] = (1.0, -1.0, 0.6, -0.6)) -> tuple[Record, list[SetpointStep]]:
     """Take off, and fly steps of roll, pitch and yaw rate and of thrust in both directions, with pauses between them.
 
     Args:
@@ -124,7 +124,7 @@ def fly_steps(rig: Rig, shares: tuple[float, ...] = (1.0, -1.0, 0.6, -0.6)) -> t
                 hand.fly(REST_S, rest)
                 change, begun = share * size * np.eye(4)[channel], len(hand.sent)
                 hand.fly(HOLD_S, rest + change)
-                steps.append(Step(float(hand.sent[begun][0]), channel, share * size))
+                steps.append(SetpointStep(float(hand.sent[begun][0]), channel, share * size))
                 hand.fly(HOLD_S, rest - change)
                 hand.fly(REST_S, rest)
         hand.fly(CALM_S)

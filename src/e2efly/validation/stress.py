@@ -11,7 +11,7 @@ import numpy as np
 
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import Episodes, run_stepwise, summary
-from e2efly.environment.stress_rows import ROWS, Draw, Row, check_rows, check_seen, rows_for, with_longer_queue
+from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import prepare
 from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate, episode_steps, settling
 from e2efly.vehicles.vehicle import Controller, Vehicle
@@ -111,11 +111,11 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
     return flown
 
 
-def draws(row: Row, vehicle: Vehicle, seed: int, n: int) -> Draw:
+def draws(row: StressRow, vehicle: Vehicle, seed: int, n: int) -> Draw:
     """The first n episodes of a row for the seed of the starts. They do not depend on the number of episodes."""
     batches = [Draw.of(row, vehicle, _generator(row, seed, i), BATCH) for i in range(-(-n // BATCH))]
     return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 
 
-def _generator(row: Row, seed: int, batch: int) -> np.random.Generator:
+def _generator(row: StressRow, seed: int, batch: int) -> np.random.Generator:
     return np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])

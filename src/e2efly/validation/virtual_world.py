@@ -11,7 +11,7 @@ from e2efly.control import Quat
 from e2efly.courses.origin import Origin
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pose_source import PoseSource
-from e2efly.flight.pose.tracking import Track, track
+from e2efly.flight.pose.tracking import PoseTrack, track
 from e2efly.flight.sight.shared import SharedImages
 from e2efly.policy.odometry import Odometry
 from e2efly.validation.plant import RigidState
@@ -56,7 +56,7 @@ class Node:
     """Why the newest pose was refused. None: it was not refused."""
     began: float | None = field(default=None, init=False)
     """Time at which the world's time was 0, on the monotonic clock, s. None: it has not begun."""
-    _track: Track = field(default=Track(), init=False)
+    _track: PoseTrack = field(default=PoseTrack(), init=False)
     _odometry: Odometry | None = field(default=None, init=False)
     _received: float = field(default=-math.inf, init=False)
     _due: float = field(default=-math.inf, init=False)
@@ -83,7 +83,9 @@ class Node:
         """
         began = self.began = now if self.began is None else self.began
         if self._track.fault and now - self._received > RESTART_S:
-            self._track = Track()  # the vehicle may have been carried elsewhere; the policy's flight has ended by now
+            self._track = (
+                PoseTrack()
+            )  # the vehicle may have been carried elsewhere; the policy's flight has ended by now
         for sample in self.source.read(now):
             self._track, odometry, self.refused = track(self.checks, self._track, sample)
             if odometry is not None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics import State
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import powered
 from e2efly.simulation.physics.integrate import rk4
 from e2efly.simulation.physics.state import Parts
@@ -30,7 +30,7 @@ vehicle."""
 
 
 @dataclass(frozen=True)
-class Body:
+class FlownBody:
     """The rigid body's state: the fields of `physics.State`, NumPy, one vehicle."""
 
     position: np.ndarray
@@ -52,20 +52,20 @@ class World:
         """Rotor speed at full motor output, rad/s."""
         return self.vehicle.full_rotor_speed
 
-    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Body:
+    def at_rest(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> FlownBody:
         """The state on the ground with stopped rotors."""
         zero = np.zeros(3)
         position = np.array([x, y, self.vehicle.feet_height])
-        return Body(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
+        return FlownBody(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
 
     def advance(
         self,
-        state: Body,
+        state: FlownBody,
         motors: np.ndarray,
         dt: float,
         wind: np.ndarray | None = None,
         rotor_share: np.ndarray | None = None,
-    ) -> Body:
+    ) -> FlownBody:
         """The state after `dt` s under constant motor outputs.
 
         Args:
@@ -80,10 +80,10 @@ class World:
             return state  # nothing changes for seconds after each boot
         steps = max(round(dt / STEP_S), 1)
         air, share = np.zeros(3) if wind is None else wind, np.ones(4) if rotor_share is None else rotor_share
-        parts = (getattr(state, f.name) for f in fields_of(Body))
+        parts = (getattr(state, f.name) for f in fields_of(FlownBody))
         row = np.concatenate([*parts, np.asarray(motors) * self.full_speed, air, share]).astype(np.float32)
         after = np.asarray(self._steps(row, steps), np.float64)  # one array in and out: the transfer costs most
-        return Body(after[:3], after[3:6], after[6:10], after[10:13], after[13:])
+        return FlownBody(after[:3], after[3:6], after[6:10], after[10:13], after[13:])
 
     @cached_property
     def _steps(self) -> Any:
@@ -92,7 +92,7 @@ class World:
 
         def run(row: Any, steps: int) -> Any:
             state = State(row[:3], row[3:6], row[6:10], row[10:13], row[13:17])
-            command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Plant.of(vehicle, STEP_S, row[24:28])
+            command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Airframe.of(vehicle, STEP_S, row[24:28])
 
             def step(parts: Parts, _: None) -> tuple[Parts, None]:
                 told = powered(plant, parts.rotor_speed, command)  # type: ignore[arg-type]
@@ -106,7 +106,7 @@ class World:
 
         return _PROGRAMS.setdefault(vehicle.hash, jax.jit(run, static_argnums=1))
 
-    def sensed(self, before: Body, after: Body, dt: float) -> FirmwareState:
+    def sensed(self, before: FlownBody, after: FlownBody, dt: float) -> FirmwareState:
         """The readings of gyroscope and accelerometer after a step of `dt` s."""
         felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
         attitude = Quat(*after.quaternion)

@@ -15,7 +15,7 @@ _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)))
 
 
 @dataclass(frozen=True)
-class Panel:
+class CurvePanel:
     """The curves of one task, and which of them to draw."""
 
     title: str
@@ -24,7 +24,7 @@ class Panel:
     """Draw the error instead of the success rate."""
 
 
-def plot_ablation(panels: Sequence[Panel], path: str | Path, title: str) -> None:
+def plot_ablation(panels: Sequence[CurvePanel], path: str | Path, title: str) -> None:
     """Draw one panel per task: for every variant, the mean over the seeds against steps, and a band from the worst to
     the best seed.
 
@@ -47,7 +47,7 @@ def plot_ablation(panels: Sequence[Panel], path: str | Path, title: str) -> None
             ax.set_axis_off()
 
 
-def _draw(ax: Axes, panel: Panel) -> None:
+def _draw(ax: Axes, panel: CurvePanel) -> None:
     curves = panel.curves
     lines = worst(curves, panel.by_error)
     steps = curves.steps / 1e6

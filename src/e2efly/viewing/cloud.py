@@ -9,21 +9,21 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 
-from e2efly.viewing.image_plots import Sight, resolution
+from e2efly.viewing.image_plots import ImageSight, resolution
 from e2efly.viewing.style import SPEED, VERMILLION, figure
 
 SHOWN = 20.0
 """Largest distance at which points of a LiDAR are drawn, m."""
 
 
-def cloud(sight: Sight) -> np.ndarray:
+def cloud(sight: ImageSight) -> np.ndarray:
     """The points that a LiDAR measures, (m, 3), world, m."""
     metres = sight.images["range"]
     met = (metres > 0) & (metres < sight.camera.reach[1])
     return sight.origin + metres[met][:, None] * sight.directions[met]
 
 
-def write_cloud(sight: Sight, path: Path, where: str) -> None:
+def write_cloud(sight: ImageSight, path: Path, where: str) -> None:
     """Draw a LiDAR's points, in 3D and from above, coloured by height.
 
     Args:
@@ -54,7 +54,7 @@ def write_cloud(sight: Sight, path: Path, where: str) -> None:
         bar.ax.grid(False)
 
 
-def _nearby(sight: Sight, points: np.ndarray) -> np.ndarray:
+def _nearby(sight: ImageSight, points: np.ndarray) -> np.ndarray:
     return points[np.linalg.norm(points - sight.origin, axis=1) < SHOWN]
 
 
@@ -63,7 +63,7 @@ def _height(points: np.ndarray) -> Normalize:
     return Normalize(low, max(points[:, 2].max(initial=-np.inf), low + 1.0))
 
 
-def plan_of(ax: Axes, sight: Sight, title: str = "From above") -> None:
+def plan_of(ax: Axes, sight: ImageSight, title: str = "From above") -> None:
     """Draw a LiDAR's points from above, on axes, coloured by height. Higher points cover lower ones."""
     points = _nearby(sight, cloud(sight))
     points = points[np.argsort(points[:, 2])]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.control import Quat
-from e2efly.logs.blackbox import Alignment, Blackbox
+from e2efly.logs.blackbox import Blackbox, LogClock
 from e2efly.logs.flight_log import FlightLog, Series
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.viewing.rate_response import EXCITATION, StepResponse, step_response
@@ -143,7 +143,7 @@ def tilt(quaternion: np.ndarray) -> np.ndarray:
     return Quat.of(quaternion).tilt()
 
 
-def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: Alignment | None = None) -> dict[str, Any]:
+def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogClock | None = None) -> dict[str, Any]:
     """The flight in numbers, SI units. None where nothing is known. It can be written as JSON."""
     motion, timing, link, battery = log["odometry"], log["timing"], log["link"], log["battery"]
     speed = np.linalg.norm(motion.numbers("velocity", 3), axis=1)

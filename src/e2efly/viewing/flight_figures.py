@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from e2efly.logs.blackbox import Alignment, Blackbox, align, read_blackbox
+from e2efly.logs.blackbox import Blackbox, LogClock, align, read_blackbox
 from e2efly.logs.flight_log import FlightLog
 from e2efly.viewing import flight_health as health
 from e2efly.viewing import flight_report as report
 from e2efly.viewing.flight_data import blackbox_responses, gyro, responses
 
 
-def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = None) -> list[Path]:
+def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, LogClock] | None = None) -> list[Path]:
     """Draw the figures of a flight for which data was recorded, into a folder. Returns their paths."""
     estimates = {"log": responses(log)} | ({"blackbox": blackbox_responses(laid[0])} if laid else {})
     figures: dict[str, tuple[tuple[str, ...], Callable[[Path], None]]] = {
@@ -33,14 +33,14 @@ def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, Alignment] | None = No
     return paths
 
 
-def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, Alignment]:
+def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, LogClock]:
     """The session of a blackbox log that belongs to this flight, and its alignment in time.
 
     Raises:
         ValueError: when no session belongs to this flight.
     """
     time, rate, _ = gyro(log)
-    found: list[tuple[Blackbox, Alignment]] = []
+    found: list[tuple[Blackbox, LogClock]] = []
     reasons: list[str] = []
     for session in read_blackbox(path):
         try:

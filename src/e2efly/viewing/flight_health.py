@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from e2efly.config.drawing import INK, ORANGE
-from e2efly.logs.blackbox import Alignment, Blackbox
+from e2efly.logs.blackbox import Blackbox, LogClock
 from e2efly.logs.flight_log import FlightLog
 from e2efly.viewing.flight_axes import XYZ, bands, empty, liveliest, note
 from e2efly.viewing.flight_data import AXES, GROUNDED, gyro, intervals
@@ -154,7 +154,7 @@ def _throttle_points(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
     return sent[good], force[good]
 
 
-def plot_blackbox(log: FlightLog, blackbox: Blackbox, alignment: Alignment, path: str | Path) -> None:
+def plot_blackbox(log: FlightLog, blackbox: Blackbox, alignment: LogClock, path: str | Path) -> None:
     """The flight controller's blackbox over the flight log: the rates of both, its setpoint, and its motors."""
     commands = log["command"]
     time, measured, source = gyro(log)

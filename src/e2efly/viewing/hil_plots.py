@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 
 from e2efly.courses.origin import Origin
-from e2efly.simulation.scenes.faces import Body, bodies
+from e2efly.simulation.scenes.faces import FacesBody, bodies
 from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.validation.hil_lap import Lap
@@ -109,7 +109,7 @@ def _track(ax: Axes, points: np.ndarray, flown: np.ndarray) -> None:
     ax.plot(*points[0, :, None], **START, zorder=4)
 
 
-def _draw_side(ax: Axes, things: list[Body]) -> None:
+def _draw_side(ax: Axes, things: list[FacesBody]) -> None:
     """Draw solids as seen along y, the far ones first."""
     order = sorted(things, key=lambda body: -body.quads[..., 1].mean())
     for body in order:

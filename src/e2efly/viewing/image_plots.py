@@ -47,7 +47,7 @@ TILE = 16
 
 
 @dataclass(frozen=True)
-class Sight:
+class ImageSight:
     """The view of one camera at one moment."""
 
     camera: CameraConfig
@@ -103,7 +103,7 @@ def look_around(
     quaternion: np.ndarray,
     channels: tuple[str, ...] = CHANNELS,
     exposed: float = 1.0,
-) -> Sight:
+) -> ImageSight:
     """Everything that a camera on a vehicle in a world sees.
 
     Args:
@@ -129,7 +129,7 @@ def look_around(
         near, far = camera.reach
         for name, metres in (("range", images["depth"] * length), ("depth", images["depth"])):
             images[name] = np.where(metres < near, 0.0, np.minimum(metres, far))
-    return Sight(camera, images, rays / length[..., None], origin)
+    return ImageSight(camera, images, rays / length[..., None], origin)
 
 
 def exposure(pictures: Iterable[np.ndarray]) -> float:
@@ -209,7 +209,7 @@ def classes(image: np.ndarray) -> list[Patch]:
     ]
 
 
-def write_pictures(sight: Sight, folder: Path, where: str) -> list[Path]:
+def write_pictures(sight: ImageSight, folder: Path, where: str) -> list[Path]:
     """Write one PNG file per sensor.
 
     Args:

@@ -16,12 +16,12 @@ from e2efly.config.drawing import INK
 from e2efly.simulation.physics import State
 from e2efly.simulation.sensors.imu import ImuState, measure
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.viewing.image_plots import Sight, scale, show
+from e2efly.viewing.image_plots import ImageSight, scale, show
 from e2efly.viewing.sheet import BAR, DEPTH_NOISES, IMAGE_NOISES, noised
 from e2efly.viewing.style import BLUE, GREY, VERMILLION, figure
 
 
-def plot_depth_noise(sight: Sight, key: PRNGKeyArray, path: str | Path) -> None:
+def plot_depth_noise(sight: ImageSight, key: PRNGKeyArray, path: str | Path) -> None:
     """Draw each noise of depth, and below it the error, for a pinhole camera."""
     camera = dataclasses.replace(sight.camera, sees="depth")
     clean = sight.images["depth"]
@@ -45,7 +45,7 @@ def plot_depth_noise(sight: Sight, key: PRNGKeyArray, path: str | Path) -> None:
         bar.ax.grid(False)
 
 
-def plot_image_noise(sight: Sight, mask: Float[np.ndarray, "h w"], key: PRNGKeyArray, path: str | Path) -> None:
+def plot_image_noise(sight: ImageSight, mask: Float[np.ndarray, "h w"], key: PRNGKeyArray, path: str | Path) -> None:
     """Draw each noise of values in [0, 1]: on colours, and on a mask of 0 and 1."""
     colour, label = (dataclasses.replace(sight.camera, sees=sees) for sees in ("rgb", "label"))
     with figure(path, "Noise of images in [0, 1]", 4.1, ["Of colours, and of a mask of 0 and 1"]) as fig:

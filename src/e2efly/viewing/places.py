@@ -33,7 +33,7 @@ _TIMES = np.linspace(0.0, 12.0, 7)
 
 
 @dataclass(frozen=True)
-class Place:
+class ScenePlace:
     """One world and a route through it."""
 
     scene: Scene | MeshScene
@@ -73,7 +73,7 @@ def place_names() -> list[str]:
 
 def find_place(
     name: str, key: PRNGKeyArray, unit: float = 1.0, up: Literal["y", "z"] | None = None, materials: bool = True
-) -> Place:
+) -> ScenePlace:
     """A place by its name, or by the path of a file: a scene's or a track's .toml, or a mesh.
 
     Args:
@@ -124,8 +124,8 @@ def _clutter(key: PRNGKeyArray, config: ClutterConfig, route: np.ndarray) -> dic
     return jax.jit(lambda key: generate.clutter(key, 1, config, path, path[:, [0, -1]], 0.3))(key)
 
 
-def _place(solids: dict[str, Solids], route: np.ndarray) -> Place:
-    return Place(Scene.of(solids, 1), route, np.zeros(len(route) - 1, bool))
+def _place(solids: dict[str, Solids], route: np.ndarray) -> ScenePlace:
+    return ScenePlace(Scene.of(solids, 1), route, np.zeros(len(route) - 1, bool))
 
 
 def _has_gates(path: Path) -> bool:
@@ -136,11 +136,11 @@ def _has_gates(path: Path) -> bool:
         return False
 
 
-def _of_track(track: RaceTrack) -> Place:
+def _of_track(track: RaceTrack) -> ScenePlace:
     size = np.column_stack([track.opening / 2, np.full((len(track.yaw), 2), [BAR, DEPTH])])
     gates = Solids.of("gate", track.position[None], size[None], yaw=track.yaw[None])
     route, straight = _through(track.position, track.yaw, closed=track.closed)
-    return Place(Scene.of({"gate": gates}, 1), np.vstack([track.start, route]), np.append(False, straight))
+    return ScenePlace(Scene.of({"gate": gates}, 1), np.vstack([track.start, route]), np.append(False, straight))
 
 
 def _through(position: np.ndarray, yaw: np.ndarray, closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +151,7 @@ def _through(position: np.ndarray, yaw: np.ndarray, closed: bool = False) -> tup
     return pairs.reshape(-1, 3), np.arange(2 * len(pairs) - 1) % 2 == 0
 
 
-def _of_scene(scene: Scene) -> Place:
+def _of_scene(scene: Scene) -> ScenePlace:
     """A place with a route through the gates of a scene in order. Without gates, along its longer side."""
     there = {kind: np.asarray(s.active[0]) for kind, s in scene.solids.items()}
     if "gate" in scene.kinds and there["gate"].any():
@@ -159,7 +159,7 @@ def _of_scene(scene: Scene) -> Place:
         yaw = Quat.of(np.asarray(s.quaternion[0][there["gate"]], float)).yaw()
         route, straight = _through(np.asarray(s.centre[0][there["gate"]], float), yaw)
         ends = route[0] + (route[0] - route[1]), route[-1] + (route[-1] - route[-2])
-        return Place(scene, np.vstack([ends[0], route, ends[1]]), np.concatenate([[False], straight, [False]]))
+        return ScenePlace(scene, np.vstack([ends[0], route, ends[1]]), np.concatenate([[False], straight, [False]]))
     centres = [np.asarray(s.centre[0], float)[there[kind]] for kind, s in scene.solids.items()]
     points = np.concatenate([*centres, np.zeros((0, 3))])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
@@ -169,10 +169,10 @@ def _of_scene(scene: Scene) -> Place:
     way = np.zeros(3)
     way[axis] = half[axis] + 3.0
     middle[2] = max(middle[2], ground + 1.2)
-    return Place(scene, np.stack([middle - way, middle + way]), np.zeros(1, bool))
+    return ScenePlace(scene, np.stack([middle - way, middle + way]), np.zeros(1, bool))
 
 
-def _of_mesh(scene: MeshScene) -> Place:
+def _of_mesh(scene: MeshScene) -> ScenePlace:
     """A place with a route along the longer side of a mesh, between positions with free space around them, as low as
     possible.
     """
@@ -187,4 +187,4 @@ def _of_mesh(scene: MeshScene) -> Place:
         gap = np.asarray(distance.clearance(grid, jnp.asarray([[*end[:2], z] for z in height], jnp.float32)))
         free = np.flatnonzero(gap > 1.0)
         ends.append([*end[:2], height[free[0] if len(free) else int(gap.argmax())]])
-    return Place(scene, np.array(ends), np.zeros(1, bool), grid)
+    return ScenePlace(scene, np.array(ends), np.zeros(1, bool), grid)

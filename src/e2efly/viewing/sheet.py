@@ -14,8 +14,8 @@ from e2efly.simulation.scenes.faces import bodies
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.simulation.sensors.image_noise import SYNTHETIC, add_image_noise
 from e2efly.viewing.cloud import plan_of
-from e2efly.viewing.image_plots import SENSORS, Sight, classes, scale, shape_of, show
-from e2efly.viewing.places import Place
+from e2efly.viewing.image_plots import SENSORS, ImageSight, classes, scale, shape_of, show
+from e2efly.viewing.places import ScenePlace
 from e2efly.viewing.style import VERMILLION, WIDTH, figure, say
 from e2efly.viewing.tour import Tour
 from e2efly.viewing.worlds import draw_plan
@@ -41,7 +41,14 @@ def noised(config: ImageNoiseConfig, key: PRNGKeyArray, image: np.ndarray, camer
 
 
 def write_sheet(
-    sight: Sight, lidar: Sight, place: Place, tour: Tour, key: PRNGKeyArray, path: Path, title: str, where: str
+    sight: ImageSight,
+    lidar: ImageSight,
+    place: ScenePlace,
+    tour: Tour,
+    key: PRNGKeyArray,
+    path: Path,
+    title: str,
+    where: str,
 ) -> None:
     """Draw the contact sheet.
 
@@ -87,7 +94,7 @@ def _head(fig: Any, title: str) -> None:
     fig.suptitle(title, x=0.012, ha="left", weight="bold", size=11)
 
 
-def _sensors(first: Any, second: Any, sight: Sight, lidar: Sight, place: Place, tour: Tour) -> None:
+def _sensors(first: Any, second: Any, sight: ImageSight, lidar: ImageSight, place: ScenePlace, tour: Tour) -> None:
     """Two rows: the sensors, a LiDAR's points, and a map."""
     _head(first, "Sensors")
     upper, lower = first.subplots(1, 4), second.subplots(1, 4)
@@ -111,7 +118,7 @@ def _sensors(first: Any, second: Any, sight: Sight, lidar: Sight, place: Place, 
     plan.set_aspect("equal", adjustable="datalim")
 
 
-def _ground_plan(ax: Axes, place: Place, height: float) -> None:
+def _ground_plan(ax: Axes, place: ScenePlace, height: float) -> None:
     """Draw the objects of a world from above. For a world of triangles, the solid areas at a height, m."""
     if isinstance(place.scene, Scene):
         draw_plan(ax, bodies(place.scene))

@@ -21,7 +21,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from e2efly.config import TaskConfig
 from e2efly.config.drawing import INK, Face, Line, Mark, Thing
-from e2efly.simulation.scenes.faces import Body
+from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.objects import scene
 from e2efly.viewing.style import FAILURE, GREY, MARK, PALE, SPEED, START, figure
@@ -38,7 +38,7 @@ _TEXT: dict[str, Any] = {
 
 
 def plot_flights(
-    task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[Body] = (),
+    task: TaskConfig, flights: Flights, path: str | Path, title: str, solids: Sequence[FacesBody] = (),
     notes: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Draw episodes in 3D and from above, coloured by speed, with the objects of the task.
@@ -95,7 +95,7 @@ def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
     ax.set_position((at.x0 + shift[0], at.y0 + shift[1], at.width, at.height))
 
 
-def _bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[Body]) -> tuple[Corner, Corner]:
+def _bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[FacesBody]) -> tuple[Corner, Corner]:
     """Corners of a box around everything that is drawn, with the ground and a margin, at least 0.6 m wide."""
     points = [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
     points += [body.quads.reshape(-1, 3) for body in solids]

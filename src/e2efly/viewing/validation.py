@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 from e2efly.config.drawing import INK, Face, Line, Thing
 from e2efly.control import COMMAND_MODES
 from e2efly.policy.runtime import Acting
-from e2efly.validation.fleet import Flight, Mission, fly_all
+from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant_validation import Validation
 from e2efly.validation.reality import Reality
 from e2efly.validation.task_verdict import judge
@@ -118,8 +118,8 @@ def flown_again(found: Validation) -> dict[str, Pair]:
         home = Reality(nominal, contract.latency_of(nominal))
         env = flew.at_home.environment(suite)
         sights = v.starts.sights(env, found.seed)
-        asked = [Flight(v.starts.states[i], v.starts.courses[i], home, sights[i]) for i in shown]
-        mission = Mission(flew.file, "simulator", nominal, nominal, float(suite.episode_s), baseline=flew.baseline)
+        asked = [FleetFlight(v.starts.states[i], v.starts.courses[i], home, sights[i]) for i in shown]
+        mission = FleetMission(flew.file, "simulator", nominal, nominal, float(suite.episode_s), baseline=flew.baseline)
         again = fly_all(mission, asked, processes=1)
         verdicts = judge(env, v.starts.of(shown), again)
         there = [v.flights[i] for i in shown]

@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from e2efly.config.drawing import INK
 from e2efly.control import Quat
-from e2efly.simulation.scenes.faces import Body, bodies
+from e2efly.simulation.scenes.faces import FacesBody, bodies
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.style import FAILURE, GREY, MARK, SPEED, START, WIDTH, figure
@@ -34,7 +34,7 @@ NUMBER: dict[str, Any] = {
 """Style of the number of a goal."""
 
 
-def draw_plan(ax: Axes, things: Sequence[Body]) -> None:
+def draw_plan(ax: Axes, things: Sequence[FacesBody]) -> None:
     """Add solids to axes x, y in m: filled outlines from above, dotted for solids that move."""
     outlines = [body.outline for body in things]
     faces = [_pale(body.colour, 0.35) for body in things]
@@ -43,7 +43,7 @@ def draw_plan(ax: Axes, things: Sequence[Body]) -> None:
     ax.add_collection(LineCollection(ways, colors=GREY, linewidths=0.8, linestyles=":", zorder=1.7))
 
 
-def draw_space(ax: Any, things: Sequence[Body]) -> None:
+def draw_space(ax: Any, things: Sequence[FacesBody]) -> None:
     """Add solids to 3D axes in m, light enough to see a path behind them."""
     for body in things:
         faces = Poly3DCollection(list(body.quads), facecolors=[_pale(body.colour, 0.3)], shade=True, zorder=1.6)
@@ -155,7 +155,7 @@ def _goals(plan: Axes, side: Axes, goal: np.ndarray, way: np.ndarray) -> None:
         side.annotate(str(number), (way[k], goal[k, 2]), (3, 3), textcoords="offset points", **NUMBER)
 
 
-def _bounds(tracks: list[np.ndarray], worlds: list[list[Body]]) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(tracks: list[np.ndarray], worlds: list[list[FacesBody]]) -> tuple[np.ndarray, np.ndarray]:
     """Corners of a horizontal rectangle around the flights and the centres of the solids, with a margin. Of a long
     wall, only the part near the flights is visible.
     """

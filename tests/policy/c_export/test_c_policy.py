@@ -12,7 +12,7 @@ from onnx import TensorProto, helper, numpy_helper
 from e2efly.commands.cli import run
 from e2efly.learning.onnx_export import write_policy
 from e2efly.policy.c_export.c_source import sources
-from e2efly.policy.c_export.program import Program, layout
+from e2efly.policy.c_export.program import CProgram, layout
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 
@@ -119,7 +119,7 @@ def test_arrays_that_are_needed_at_the_same_time_do_not_overlap() -> None:
     """Of programs by chance: no step finds what it reads overwritten by another."""
     rng = np.random.default_rng(0)
     for _ in range(200):
-        program, known = Program(), []
+        program, known = CProgram(), []
         for _ in range(rng.integers(2, 12)):
             reads = [known[i] for i in rng.integers(0, len(known), min(2, len(known)))]
             in_place = bool(rng.integers(2)) and len({x.shape for x in reads}) == 1

@@ -12,7 +12,7 @@ import pytest
 
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, step
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.state import Parts, split4
 from e2efly.vehicles.vehicle import Vehicle, quantities
 
@@ -81,7 +81,7 @@ def fly_open_loop() -> Fly:
         integrator: str, plant: Vehicle, state: State, commands: jax.Array, wind: Any, period: Any, substeps: Any
     ) -> State:
         air, dt = Vec3.of(wind), period / substeps
-        parts_of_plant = Plant.of(plant, dt)
+        parts_of_plant = Airframe.of(plant, dt)
 
         def one(parts: Parts, command: jax.Array) -> tuple[Parts, State]:
             def substep(_: jax.Array, parts: Parts) -> Parts:

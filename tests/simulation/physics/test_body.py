@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics import State, body
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.state import split4
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
@@ -23,8 +23,8 @@ def draws(seed: int, size: int, scale: float = 1.0, n: int = 200) -> np.ndarray:
     return scale * np.random.default_rng(seed).normal(size=(n, size))
 
 
-def plant(vehicle: Vehicle) -> Plant:
-    return Plant.of(vehicle, 0.005)
+def plant(vehicle: Vehicle) -> Airframe:
+    return Airframe.of(vehicle, 0.005)
 
 
 def test_drag_takes_energy_in_every_direction(vis_r: Vehicle) -> None:

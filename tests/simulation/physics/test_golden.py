@@ -15,7 +15,7 @@ import pytest
 from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import Physics, State, step
-from e2efly.simulation.physics.airframe import Plant, Rotors
+from e2efly.simulation.physics.airframe import Airframe, Rotors
 from e2efly.simulation.physics.integrate import INTEGRATORS
 from e2efly.simulation.physics.state import Parts
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
@@ -154,7 +154,7 @@ def test_the_default_physics_is_exact_to_a_millimetre_over_two_seconds(name: str
         first, asked = jax.tree.map(lambda x: jnp.asarray(x, dtype), (start, commands))
         return np.asarray(jax.jit(flight)(first, asked).position, np.float64)
 
-    def fine(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+    def fine(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
         count = 16
         finer = dataclasses.replace(plant, decay=plant.decay ** (1 / count), half_decay=plant.half_decay ** (1 / count))
         return jax.lax.fori_loop(0, count, lambda _, p: INTEGRATORS["rk4"](finer, p, command, wind, dt / count), parts)

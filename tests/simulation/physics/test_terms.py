@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, Physics, RateLoop, State, started, step
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import angular_acceleration
 from e2efly.vehicles.vehicle import Vehicle, inertia_tensor, terms
 from e2efly.vehicles.vehicle_rules import BATTERY, battery_share
@@ -182,7 +182,7 @@ def test_eulers_equation_with_products_of_inertia(vis_r: Vehicle) -> None:
     vehicle, rng = having(vis_r, "inertia_products"), np.random.default_rng(2)
     rate, torque, tensor = 5 * rng.normal(size=(20, 3)), 0.1 * rng.normal(size=(20, 3)), inertia_tensor(vehicle)
     expected = np.linalg.solve(tensor, (torque - np.cross(rate, rate @ tensor)).T).T
-    plant = Plant.of(vehicle, 0.005)
+    plant = Airframe.of(vehicle, 0.005)
     actual = angular_acceleration(plant, Vec3.of(jnp.asarray(rate)), Vec3.of(jnp.asarray(torque))).stack()
     np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
 

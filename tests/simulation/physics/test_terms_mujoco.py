@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, State
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import derivative, rotor_speed_for
 from e2efly.simulation.physics.state import Parts, split4
 from e2efly.vehicles.vehicle import Vehicle
@@ -68,7 +68,7 @@ def test_rotors_that_are_bodies_of_their_own(stone: Vehicle, random_state: Calla
     assert np.ptp(speeds, axis=0).min() > 250
     assert np.ptp(rates, axis=0).min() > 1
 
-    plant = Plant.of(vehicle, STEP)
+    plant = Airframe.of(vehicle, STEP)
     quiet = Parts.of(dataclasses.replace(start, velocity=jnp.zeros(3), position=jnp.zeros(3)))
 
     def one(rate: jax.Array, driven: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
@@ -125,6 +125,6 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
 
 def flown(vehicle: Vehicle, start: State, steps: int) -> State:
     """Our physics at constant rotor speeds."""
-    plant, speed = Plant.of(vehicle, STEP), split4(start.rotor_speed)
+    plant, speed = Airframe.of(vehicle, STEP), split4(start.rotor_speed)
     one = lambda _, parts: INTEGRATORS["rk4"](plant, parts, speed, None, STEP)  # noqa: E731
     return jax.lax.fori_loop(0, steps, one, Parts.of(start)).join()

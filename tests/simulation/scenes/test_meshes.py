@@ -21,7 +21,7 @@ from e2efly.simulation.scenes.mesh import parts
 from e2efly.simulation.scenes.meshes.distance import DistanceGrid, clearance
 from e2efly.simulation.scenes.meshes.load import load_mesh_scene, mesh_scene_names
 from e2efly.simulation.scenes.meshes.mesh_cast import cast as mesh_cast
-from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene, Part
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart, MeshScene
 from e2efly.simulation.scenes.scene import COLOURS, GATE, GROUND, OBSTACLE, SKY, WALL, Scene
 from e2efly.simulation.scenes.shapes import FAR
 from tests.simulation.scenes.test_cast import LEVEL, crowd
@@ -30,11 +30,11 @@ CONFIG = CameraConfig(width=80, height=48, fov=(1.4, 1.0))
 AHEAD = np.array([[0.0, 0.0, 2.0]], np.float32)
 
 
-def solid(mesh: trimesh.Trimesh, name: str = "thing", **about: Any) -> Part:
-    return Part(name, np.asarray(mesh.vertices), np.asarray(mesh.faces), **about)
+def solid(mesh: trimesh.Trimesh, name: str = "thing", **about: Any) -> MeshPart:
+    return MeshPart(name, np.asarray(mesh.vertices), np.asarray(mesh.faces), **about)
 
 
-def box(extents: Any = (1.0, 1.0, 1.0), centre: Any = (0.0, 0.0, 0.0), name: str = "thing", **about: Any) -> Part:
+def box(extents: Any = (1.0, 1.0, 1.0), centre: Any = (0.0, 0.0, 0.0), name: str = "thing", **about: Any) -> MeshPart:
     mesh = trimesh.creation.box(extents)
     mesh.apply_translation(centre)
     return solid(mesh, name, **about)
@@ -123,7 +123,7 @@ class TestCast:
         faces = np.array([[0, 2, 1], [0, 3, 2]])
         uv = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # as seen from the camera
         texture = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
-        rgb = see(MeshScene.of([Part("sign", square, faces, uv=uv, texture=texture)]))["rgb"][0]
+        rgb = see(MeshScene.of([MeshPart("sign", square, faces, uv=uv, texture=texture)]))["rgb"][0]
         quarter = {
             place: np.round(rgb[place] / rgb[place].max(), 3).tolist()
             for place in ((22, 38), (22, 42), (26, 38), (26, 42))

@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 import trimesh
 
-from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene, Part
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart, MeshScene
 from e2efly.simulation.scenes.meshes.near import Near
 from e2efly.simulation.scenes.scene import GATE, PAD
 
 
-def box(size: Any, centre: Any, name: str = "thing", **about: Any) -> Part:
+def box(size: Any, centre: Any, name: str = "thing", **about: Any) -> MeshPart:
     mesh = trimesh.creation.box(size)
     mesh.apply_translation(centre)
-    return Part(name, np.asarray(mesh.vertices), np.asarray(mesh.faces), **about)
+    return MeshPart(name, np.asarray(mesh.vertices), np.asarray(mesh.faces), **about)
 
 
-def sheet(size: float, name: str = "scan", height: float = 0.0) -> Part:
+def sheet(size: float, name: str = "scan", height: float = 0.0) -> MeshPart:
     corners = size / 2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) + [0.0, 0.0, height]
-    return Part(name, corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    return MeshPart(name, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def near(*parts: Part) -> Near:
+def near(*parts: MeshPart) -> Near:
     return Near.of(MeshScene.of(parts))
 
 

@@ -16,7 +16,7 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.film import Soup, beside, film, picture
 from e2efly.viewing.watch.poses import Poses
 from e2efly.viewing.watch.recorded import PERIOD, Recording, read_flight
-from e2efly.viewing.watch.stage import Frame
+from e2efly.viewing.watch.stage import StageFrame
 from e2efly.viewing.watch.triangles import SKY, mesh_of
 
 
@@ -83,7 +83,7 @@ def test_ghosts_are_flown_with_the_first(tmp_path: Path) -> None:
     flights = [read_flight(log(tmp_path / f"{i}.csv", speed=1.0 + i), vehicle) for i in range(2)]
     pictures = list(film(Recording(flights, vehicle), 0.3, 10.0, size=(45, 80)))
     assert len(pictures) == 3
-    frame: Frame = Recording(flights, vehicle).step(0)
+    frame: StageFrame = Recording(flights, vehicle).step(0)
     assert frame.position.shape == (2, 3)
 
 

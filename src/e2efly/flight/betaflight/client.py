@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from e2efly.flight.betaflight import messages, mode_slots, settings_messages
-from e2efly.flight.betaflight.codec import ERROR, REQUEST, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import ERROR, REQUEST, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.link import MOST, Link
 from e2efly.flight.clock import MONOTONIC, Clock
 
@@ -145,10 +145,10 @@ class Client:
         self._asked[code] = now
         self.requests += 1
         self._awaited.append((code, now))
-        self.link.send(encode(Frame(code, payload, version=1 if code < 255 else 2)))
+        self.link.send(encode(MspFrame(code, payload, version=1 if code < 255 else 2)))
         return True
 
-    def set_raw_rc(self, frame: Frame, now: float) -> bool:
+    def set_raw_rc(self, frame: MspFrame, now: float) -> bool:
         """Send a stick frame of `messages.set_raw_rc`, without waiting. Returns whether the link is alive."""
         if not self.link.alive:
             return False
@@ -183,7 +183,7 @@ class Client:
         """Whether another program sends sticks on this link."""
         return now - self._steered < CROWDED_S
 
-    def _take(self, frame: Frame, now: float) -> None:
+    def _take(self, frame: MspFrame, now: float) -> None:
         if frame.direction == REQUEST:
             return  # an echo, for example from a line whose two wires touch
         if any(start in frame.payload for start in _STARTS):
@@ -316,7 +316,7 @@ def ask(client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"",
     raise TimeoutError(f"MSP {_name(code)}: no answer within {timeout_s:g} s ({reason})")
 
 
-def tell(client: Client, frame: Frame, timeout_s: float = 1.0) -> None:
+def tell(client: Client, frame: MspFrame, timeout_s: float = 1.0) -> None:
     """Send a frame that sets something, and wait until the controller has accepted it; see `ask`."""
     ask(client, frame.code, timeout_s, frame.payload)
 

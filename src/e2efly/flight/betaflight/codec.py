@@ -41,7 +41,7 @@ def _crc_step(state: int, byte: int) -> int:
 
 
 @dataclass(frozen=True)
-class Frame:
+class MspFrame:
     """One MSP message."""
 
     code: int
@@ -56,7 +56,7 @@ class Frame:
     """Flags byte of version 2. 0 in version 1."""
 
 
-def encode(frame: Frame) -> bytes:
+def encode(frame: MspFrame) -> bytes:
     """The bytes of a frame.
 
     Raises:
@@ -115,19 +115,19 @@ class Decoder:
         """Number of bytes held back as the beginning of a frame, at most `max_payload` and a header."""
         return len(self._bytes)
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[MspFrame]:
         """The frames that these bytes complete, in order."""
         self._bytes += data
         self._xor += list(accumulate(data, xor, initial=self._xor[-1]))[1:]
         self._crc += list(accumulate(data, _crc_step, initial=self._crc[-1]))[1:]
         return self._scan(waiting=True)
 
-    def flush(self) -> list[Frame]:
+    def flush(self) -> list[MspFrame]:
         """Give up the incomplete frame, for example after a silence of the line. Returns the good frames inside it."""
         return self._scan(waiting=False)
 
-    def _scan(self, waiting: bool) -> list[Frame]:
-        frames: list[Frame] = []
+    def _scan(self, waiting: bool) -> list[MspFrame]:
+        frames: list[MspFrame] = []
         at, end = 0, len(self._bytes)
         while True:
             start = self._bytes.find(_START, at)
@@ -160,7 +160,7 @@ class Decoder:
                 return at
         return None
 
-    def _judge(self, at: int) -> tuple[Frame, int] | _Not:
+    def _judge(self, at: int) -> tuple[MspFrame, int] | _Not:
         """The frame that starts here and where it ends, or why no frame starts here."""
         data, size = self._bytes, len(self._bytes) - at
         if (size > 1 and data[at + 1] not in (_V1, _V2)) or (size > 2 and data[at + 2] not in _DIRECTIONS):
@@ -193,4 +193,4 @@ class Decoder:
             checksum = self._crc[end] ^ _SHIFTS[(end - body) % _PERIOD][self._crc[body]]
         if checksum != data[end]:
             return _Not.INTACT
-        return Frame(code, bytes(data[start:end]), _DIRECTIONS[data[at + 2]], version, flags), end + 1
+        return MspFrame(code, bytes(data[start:end]), _DIRECTIONS[data[at + 2]], version, flags), end + 1

@@ -12,7 +12,7 @@ from math import pi, radians
 from typing import Any, ClassVar
 
 from e2efly.flight.attitude import Attitude
-from e2efly.flight.betaflight.codec import Frame
+from e2efly.flight.betaflight.codec import MspFrame
 from e2efly.flight.betaflight.msp_names import BATTERY_STATES, SENSORS, arming_disabled, bits, named
 
 SET_RAW_RC, EEPROM_WRITE, REBOOT = 200, 250, 68
@@ -293,7 +293,7 @@ class Debug:
         return Debug(unpack("DEBUG", "4h", payload))
 
 
-def set_raw_rc(channels: Sequence[int]) -> Frame:
+def set_raw_rc(channels: Sequence[int]) -> MspFrame:
     """The frame that sends the receiver's channels to the controller.
 
     The controller sets channels that are left out to 0, which is not a valid pulse.
@@ -310,4 +310,4 @@ def set_raw_rc(channels: Sequence[int]) -> Frame:
     for i, value in enumerate(channels):
         if not low <= value <= high or value != int(value):
             raise ValueError(f"MSP SET_RAW_RC: channel {i + 1} is {value!r}; accepted: whole µs, {low} to {high}")
-    return Frame(SET_RAW_RC, struct.pack(f"<{len(channels)}H", *map(int, channels)))
+    return MspFrame(SET_RAW_RC, struct.pack(f"<{len(channels)}H", *map(int, channels)))

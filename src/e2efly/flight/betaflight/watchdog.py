@@ -24,7 +24,7 @@ from math import inf
 from typing import Any
 
 from e2efly.flight.attitude import Attitude
-from e2efly.flight.betaflight.codec import REPLY, Decoder, Frame, encode
+from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.descent import Descent, Sense, between, command, feel, move, sent
 from e2efly.flight.betaflight.lifeline import Lifeline, watch
 from e2efly.flight.betaflight.link import MOST, Link, open_link
@@ -71,7 +71,7 @@ _PACKET = 1 << 17
 
 
 @dataclass(frozen=True)
-class Plan:
+class DescentPlan:
     """What to do without the bridge. It is given in pulses, so nothing about controller or vehicle need be known.
 
     Raises:
@@ -111,7 +111,7 @@ class Plan:
                 raise ValueError(f"plan: {name} is {getattr(self, name)}; accepted: as documented, {low} to {high} us")
 
 
-def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
+def descent(plan: DescentPlan, elapsed: float, attitude: Attitude | None) -> list[int]:
     """The channels of a take-over without an accelerometer, us.
 
     Args:
@@ -124,7 +124,7 @@ def descent(plan: Plan, elapsed: float, attitude: Attitude | None) -> list[int]:
 
 
 def _channels(
-    plan: Plan, throttle: int, attitude: Attitude | None, lean: tuple[float, float] = (0.0, 0.0)
+    plan: DescentPlan, throttle: int, attitude: Attitude | None, lean: tuple[float, float] = (0.0, 0.0)
 ) -> list[int]:
     """The channels that turn towards a roll and pitch, rad, with a throttle pulse, us."""
     wanted = [0.0, 0.0, 0.0]
@@ -216,7 +216,7 @@ class WatchedLink:
         self._received.clear()
         return data
 
-    def plan(self, plan: Plan) -> None:
+    def plan(self, plan: DescentPlan) -> None:
         """Tell the watchdog what to do if the bridge falls silent."""
         self._hand(PLAN + json.dumps(asdict(plan)).encode())
 
@@ -252,7 +252,7 @@ def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout
         Why this process has landed the vehicle. Empty: the bridge ended on the ground.
     """
     heard = [bridge] if died is None else [bridge, died]
-    plan: Plan | None = None
+    plan: DescentPlan | None = None
     status: tuple[bool, str, int] | None = None
     silence, before, held = 0.0, time.monotonic(), b""
     planned = before
@@ -302,7 +302,7 @@ def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
         packets.append(packet)
 
 
-def land(link: Link, plan: Plan, held: bytes = b"", age: float = 0.0) -> None:
+def land(link: Link, plan: DescentPlan, held: bytes = b"", age: float = 0.0) -> None:
     """Level, descend, close the throttle, and keep it closed until the pilot has disarmed or nobody answers.
 
     The closed throttle must be sent all the time. Some controllers return the control to the receiver when they hear no
@@ -353,13 +353,13 @@ def land(link: Link, plan: Plan, held: bytes = b"", age: float = 0.0) -> None:
         if over and (disarmed >= 2 or now - max(told, closed_at) > DEAF_S):
             break
         asked = ASKED_AFTER if over else ASKED
-        link.send(encode(set_raw_rc(channels)) + encode(Frame(asked[rounds % len(asked)].CODE)))
+        link.send(encode(set_raw_rc(channels)) + encode(MspFrame(asked[rounds % len(asked)].CODE)))
         rounds += 1
         time.sleep(PERIOD_S)
     link.close()
 
 
-def _thrust(plan: Plan, sense: Sense, frame: bytes) -> float:
+def _thrust(plan: DescentPlan, sense: Sense, frame: bytes) -> float:
     """The thrust of a stick frame, m/s^2. Without one, that of hover."""
     for told in Decoder().feed(frame):
         at = 2 * plan.places[3]
@@ -368,7 +368,7 @@ def _thrust(plan: Plan, sense: Sense, frame: bytes) -> float:
     return GRAVITY
 
 
-def _plan(content: bytes) -> Plan | None:
+def _plan(content: bytes) -> DescentPlan | None:
     """The plan in a packet. None: it is not a valid plan, because an unreadable plan must not end this process."""
     try:
         x = json.loads(content)
@@ -378,7 +378,7 @@ def _plan(content: bytes) -> Plan | None:
         known: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in (x["sense"] or {}).items()}
         sense = Sense(**known) if known else None
         channels = tuple(x["channels"])
-        return Plan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, channels, sense)
+        return DescentPlan(x["flying"], tuple(x["rates"]), (roll, pitch, yaw), (a, b, c, d), steps, channels, sense)
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from e2efly.flight.commander.command import Command, Limits
-from e2efly.flight.commander.stream import Stream, refuse, silence, take, unsteady
+from e2efly.flight.commander.stream import CommandStream, refuse, silence, take, unsteady
 from e2efly.flight.pilot.hover import controlled, flight_gains, rates_of
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.images import Image
@@ -103,7 +103,7 @@ class Commander:
         """The vehicle with the gains with which commands are flown."""
         distance = DISTANCE if self.envelope.distance is None else self.envelope.distance
         self.limits = Limits(vehicle, settings.fence, distance)
-        self.stream = Stream()
+        self.stream = CommandStream()
         self.state: Heading | None = None
         self.decision: Decision | None = None
         self.problem: str | None = None

@@ -14,7 +14,7 @@ CLOCK_JUMP = 0.05
 
 
 @dataclass(frozen=True)
-class Stream:
+class CommandStream:
     """The commands so far. `Stream()` before the first one."""
 
     command: Command | None = None
@@ -44,7 +44,7 @@ class Stream:
 
 
 def take(
-    stream: Stream,
+    stream: CommandStream,
     command: Command,
     limits: Limits,
     odometry: Odometry | None,
@@ -52,7 +52,7 @@ def take(
     timeout: float,
     *,
     flying: bool = False,
-) -> Stream:
+) -> CommandStream:
     """Process one message.
 
     Args:
@@ -99,14 +99,14 @@ def _dated(clock: ClockMap | None, command: Command) -> tuple[ClockMap | None, f
     return follow_clock(clock, received, stamp)
 
 
-def refuse(stream: Stream, problem: str, now: float, count: int = 1) -> Stream:
+def refuse(stream: CommandStream, problem: str, now: float, count: int = 1) -> CommandStream:
     """Count messages that are not commands, or with a count of 0 note a problem of the source. They do not move the
     vehicle.
     """
     return replace(stream, since=math.inf, refused=stream.refused + count, problem=problem, problem_time=now)
 
 
-def silence(stream: Stream, now: float, timeout: float) -> str | None:
+def silence(stream: CommandStream, now: float, timeout: float) -> str | None:
     """Why there is no command to fly by now. None: there is one.
 
     Args:
@@ -122,7 +122,7 @@ def silence(stream: Stream, now: float, timeout: float) -> str | None:
     return f"{none} ({why})" if why else none
 
 
-def unsteady(stream: Stream, now: float) -> str | None:
+def unsteady(stream: CommandStream, now: float) -> str | None:
     """Why a commander whose commands arrive must not take over yet. None: it may."""
     going = now - stream.since
     if going >= STEADY_S:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from e2efly.flight.filter.arithmetic import Number, clip
-from e2efly.flight.filter.forecast import Command, Motion, Residual, Response
-from e2efly.flight.filter.turn import Step, steps_of
+from e2efly.flight.filter.forecast import ForecastCommand, ForecastMotion, Residual, Response
+from e2efly.flight.filter.turn import TurnStep, steps_of
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -77,7 +77,7 @@ class Backup:
     """The largest tilt, rad."""
     rate: float
     """The largest body rate, rad/s."""
-    steps: tuple[Step, ...]
+    steps: tuple[TurnStep, ...]
     """Steps of the turn."""
 
     @property
@@ -148,7 +148,7 @@ class Brake(NamedTuple):
     az: Number
 
 
-def axes(m: Motion) -> tuple[Number, ...]:
+def axes(m: ForecastMotion) -> tuple[Number, ...]:
     """The body's axes x, y and z in the world, nine numbers."""
     w, x, y, z = m.qw, m.qx, m.qy, m.qz
     return (
@@ -166,7 +166,7 @@ def axes_z(w: Number, x: Number, y: Number, z: Number) -> tuple[Number, Number, 
 def brake(
     xp: Any,
     b: Backup,
-    m: Motion,
+    m: ForecastMotion,
     air: Residual,
     back: tuple[Number, ...] = (0.0, 0.0, 0.0),
     gains: tuple[float, float] = (SPEED_GAIN, SPEED_GAIN),
@@ -206,7 +206,7 @@ def brake(
     )  # fmt: skip
 
 
-def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
+def _coast(xp: Any, r: Response, m: ForecastMotion) -> tuple[Number, Number]:
     """The angle about body x and y that the rate loop still turns after the command to stop, rad.
 
     This is the integral of its free response, (rate + lag * acceleration) / gain. For a rate that needs more than the
@@ -222,7 +222,7 @@ def _coast(xp: Any, r: Response, m: Motion) -> tuple[Number, Number]:
     return x * turn / rate, y * turn / rate
 
 
-def command(xp: Any, b: Backup, m: Motion, k: Brake) -> Command:
+def command(xp: Any, b: Backup, m: ForecastMotion, k: Brake) -> ForecastCommand:
     """The command that the manoeuvre sends now: turn by the shortest way, with the part of the thrust that already
     points in the desired direction.
 
@@ -241,4 +241,4 @@ def command(xp: Any, b: Backup, m: Motion, k: Brake) -> Command:
     over = (sine < 1e-3) & (cosine < 0.0)
     wx = xp.where(over, b.rate, turn * (nx * xx + ny * xy + nz * xz))
     wy = xp.where(over, 0.0, turn * (nx * yx + ny * yy + nz * yz))
-    return Command(k.thrust / k.share * xp.maximum(cosine, 0.0), wx, wy, YAW_KEPT * m.wz)
+    return ForecastCommand(k.thrust / k.share * xp.maximum(cosine, 0.0), wx, wy, YAW_KEPT * m.wz)

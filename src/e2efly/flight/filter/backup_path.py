@@ -21,7 +21,7 @@ from e2efly.flight.filter.backup import (
     Brake,
     brake,
 )
-from e2efly.flight.filter.forecast import NOTHING, Motion, Residual
+from e2efly.flight.filter.forecast import NOTHING, ForecastMotion, Residual
 from e2efly.vehicles.gravity import GRAVITY
 
 
@@ -44,7 +44,7 @@ class Way(NamedTuple):
     vz: Number
 
 
-def way(xp: Any, b: Backup, m: Motion, k: Brake, air: Residual) -> Way:
+def way(xp: Any, b: Backup, m: ForecastMotion, k: Brake, air: Residual) -> Way:
     """The path of the manoeuvre from a state.
 
     The manoeuvre turns in the plane of c and t of `Brake`, about an axis u. There the angle to t obeys the rate loop,
@@ -116,7 +116,7 @@ def stopping(b: Backup, speed: float) -> float:
     """The distance in which level flight at a speed, m/s, comes to rest with the manoeuvre, from its first command on,
     m.
     """
-    m = Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    m = ForecastMotion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
     w = way(SCALARS, b, m, brake(SCALARS, b, m, NOTHING, gains=WAY_GAINS), NOTHING)
     return max(*w.px, w.px[-1] + run_out(SCALARS, w.vx, b.braking[0]))
 

@@ -15,8 +15,8 @@ from typing import Any
 from e2efly.flight.filter.arithmetic import SCALARS, Number, clip
 from e2efly.flight.filter.backup import TIMING, Backup, axes_z, brake, command
 from e2efly.flight.filter.backup_path import stopping
-from e2efly.flight.filter.forecast import NOTHING, Actuators, Command, Motion, Residual, actuated, moved
-from e2efly.flight.filter.margins import NAMES, Limits, against, near, retreat, rooms
+from e2efly.flight.filter.forecast import NOTHING, Actuators, ForecastCommand, ForecastMotion, Residual, actuated, moved
+from e2efly.flight.filter.margins import NAMES, MarginLimits, against, near, retreat, rooms
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.gravity import GRAVITY
@@ -47,7 +47,7 @@ class Filter:
     """The vehicle, the limits and the latency for which commands are filtered. Create it with `Filter.of`."""
 
     backup: Backup
-    limits: Limits
+    limits: MarginLimits
     latency: float
     """The time from the vehicle's motion to its rate loop, s."""
 
@@ -59,7 +59,7 @@ class Filter:
             ValueError: naming the field, for a vehicle that cannot brake or a fence in which it could not stop.
         """
         backup = Backup.of(vehicle, fence.tilt)
-        limits = Limits.of(fence, float(vehicle.radius), backup.margin)
+        limits = MarginLimits.of(fence, float(vehicle.radius), backup.margin)
         filter = Filter(backup, limits, float(vehicle.latency if latency is None else latency))
         _check(filter, fence)
         return filter
@@ -74,9 +74,12 @@ def stopping_distance(filter: Filter, speed: float) -> float:
 
 def stopping_height(filter: Filter, speed: float) -> float:
     """The height between floor and ceiling, m, that level flight at a speed, m/s, needs to stop, with both margins."""
-    b, m = filter.backup, Motion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    b, m = (
+        filter.backup,
+        ForecastMotion(0.0, 0.0, 0.0, speed, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY),
+    )
     here = (0.0, 0.0, 0.0)
-    left = rooms(SCALARS, b, Limits(here, here, speed, math.inf), m, NOTHING)
+    left = rooms(SCALARS, b, MarginLimits(here, here, speed, math.inf), m, NOTHING)
     return 2 * b.margin - left[NAMES.index("floor")] - left[NAMES.index("ceiling")]
 
 
@@ -105,10 +108,10 @@ def _fastest(filter: Filter, needed: Callable[[Filter, float], float], size: flo
 
 
 @dataclass(frozen=True)
-class Memory:
+class FilterMemory:
     """What the filter remembers from step to step."""
 
-    sent: tuple[tuple[float, Command], ...] = ()
+    sent: tuple[tuple[float, ForecastCommand], ...] = ()
     """When each command was sent, s, and the command, which holds until the next one. Oldest first."""
     actuators: Actuators | None = None
     """The state of the rotors at the newest odometry, from the commands that act by then. None: no command was sent."""
@@ -128,7 +131,7 @@ class Memory:
 class Filtered:
     """The result of filtering a command."""
 
-    command: Command
+    command: ForecastCommand
     share: Number
     """Share of the change towards the manoeuvre's command. 0: the command passed unchanged."""
     room: Number
@@ -145,7 +148,7 @@ class Filtered:
         return (*NAMES, *self.solids)[self.limit]
 
 
-def remember(memory: Memory, sent: Command, now: float) -> Memory:
+def remember(memory: FilterMemory, sent: ForecastCommand, now: float) -> FilterMemory:
     """The memory after a command was sent. Sending the same command again changes nothing."""
     kept = memory.sent
     if kept and isinstance(sent.thrust, float) and kept[-1][1] == sent:
@@ -155,13 +158,13 @@ def remember(memory: Memory, sent: Command, now: float) -> Memory:
     return replace(memory, sent=(*kept, (now, sent)))
 
 
-def feel(memory: Memory, rate: tuple[float, float, float], asked: float) -> Memory:
+def feel(memory: FilterMemory, rate: tuple[float, float, float], asked: float) -> FilterMemory:
     """The memory after a gyro reading, rad/s, that was requested at the control step of `asked` s."""
     kept = tuple(one for one in memory.felt if asked - OLDEST < one[0] < asked)
     return replace(memory, felt=(*kept, (asked, rate)))
 
 
-def watch(filter: Filter, memory: Memory, odometry: Odometry, now: float, *, flying: bool) -> Memory:
+def watch(filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, *, flying: bool) -> FilterMemory:
     """The memory after the newest odometry, which may be the same as before.
 
     Args:
@@ -220,7 +223,7 @@ def _felt(
     )
 
 
-def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> Motion:
+def forecast(filter: Filter, memory: FilterMemory, odometry: Odometry, now: float) -> ForecastMotion:
     """The state at which a command that is sent now begins to act."""
     xp, (px, py, pz) = _apart(odometry.position)
     _, (vx, vy, vz) = _apart(odometry.velocity)
@@ -228,7 +231,7 @@ def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> 
     _, (wx, wy, wz) = _apart(odometry.body_rate)
     a = memory.actuators
     ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
-    m = Motion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
+    m = ForecastMotion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
     begin, before = memory.since - filter.latency, None
     felt = [one for one in memory.felt if begin < one[0] <= now]
     for at, rate in (*felt, (now, None)):
@@ -239,7 +242,9 @@ def forecast(filter: Filter, memory: Memory, odometry: Odometry, now: float) -> 
     return m
 
 
-def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> Motion:
+def _turning(
+    m: ForecastMotion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None
+) -> ForecastMotion:
     """The state with the measured body rate, and with the angular acceleration since the previous gyro reading."""
     ax, ay = m.ax, m.ay
     if before is not None and 0.0 < at - before[0] < FELT_S:
@@ -248,7 +253,7 @@ def _turning(m: Motion, rate: tuple[float, float, float], at: float, before: tup
 
 
 def filtered(
-    filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Command, *, floor: bool = True
+    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: ForecastCommand, *, floor: bool = True
 ) -> Filtered:
     """The command nearest to the wanted one that keeps all limits.
 
@@ -265,7 +270,7 @@ def filtered(
     m = forecast(filter, memory, odometry, now)
     solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
 
-    def left(c: Command) -> tuple[Number, ...]:
+    def left(c: ForecastCommand) -> tuple[Number, ...]:
         after = moved(xp, r, m, c, air, HOLD)
         return rooms(xp, b, filter.limits, after, air, solids, floor, m)
 
@@ -279,7 +284,7 @@ def filtered(
     share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)
     passes = short >= 0.0
     share = xp.where(passes, 0.0, share)
-    given = Command(*(
+    given = ForecastCommand(*(
         xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
     ))  # fmt: skip
     return Filtered(given, share, short, limit, names)
@@ -306,15 +311,17 @@ def _least(xp: Any, spare: Any, zero: Number) -> Number:
     return high
 
 
-def _between_two(a: Command, b: Command, share: Number) -> Command:
-    return Command(*(x + share * (y - x) for x, y in zip(a, b, strict=True)))
+def _between_two(a: ForecastCommand, b: ForecastCommand, share: Number) -> ForecastCommand:
+    return ForecastCommand(*(x + share * (y - x) for x, y in zip(a, b, strict=True)))
 
 
-def _between(sent: tuple[tuple[float, Command], ...], begin: float, end: float) -> list[tuple[Command, float]]:
+def _between(
+    sent: tuple[tuple[float, ForecastCommand], ...], begin: float, end: float
+) -> list[tuple[ForecastCommand, float]]:
     """The commands that held from `begin` to `end`, s, and for how long. Before the first command, the first one
     counts.
     """
-    parts: list[tuple[Command, float]] = []
+    parts: list[tuple[ForecastCommand, float]] = []
     for i, (at, c) in enumerate(sent):
         start = begin if i == 0 else max(at, begin)
         stop = min(sent[i + 1][0], end) if i + 1 < len(sent) else end
@@ -324,7 +331,7 @@ def _between(sent: tuple[tuple[float, Command], ...], begin: float, end: float) 
     return parts
 
 
-def _reach(m: Motion) -> float:
+def _reach(m: ForecastMotion) -> float:
     """Solids farther away than this do not matter for any manoeuvre, m."""
     speed = math.sqrt(m.vx**2 + m.vy**2 + m.vz**2)
     return 2.0 + speed + 0.2 * speed**2

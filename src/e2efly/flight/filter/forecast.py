@@ -17,7 +17,7 @@ from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 
-class Command(NamedTuple):
+class ForecastCommand(NamedTuple):
     """Collective thrust and body rates."""
 
     thrust: Number
@@ -28,7 +28,7 @@ class Command(NamedTuple):
     z: Number
 
 
-class Motion(NamedTuple):
+class ForecastMotion(NamedTuple):
     """The vehicle's state as single numbers. It is a tuple because a frozen dataclass takes ten times as long to
     create.
     """
@@ -143,7 +143,7 @@ def lag(time_constant: float, h: float) -> tuple[float, float]:
     return left, (1 - left) * time_constant / h
 
 
-def actuated(xp: Any, r: Response, a: Actuators, command: Command, h: float) -> Actuators:
+def actuated(xp: Any, r: Response, a: Actuators, command: ForecastCommand, h: float) -> Actuators:
     """The rotors after h s of a command. If a turn needs more than the rotors can give, the turn is slower."""
     (kx, ky, kz), (sx, sy, sz), (low, high) = r.gain, r.spread, r.thrust
     ax, bx, cx, dx = turning(kx, r.motor_time, h)
@@ -166,7 +166,7 @@ def actuated(xp: Any, r: Response, a: Actuators, command: Command, h: float) -> 
     )
 
 
-def moved(xp: Any, r: Response, m: Motion, command: Command, air: Residual, h: float) -> Motion:
+def moved(xp: Any, r: Response, m: ForecastMotion, command: ForecastCommand, air: Residual, h: float) -> ForecastMotion:
     """The motion after h s of a command. h is so short that the attitude turns by only a fraction of a radian."""
     a = actuated(xp, r, Actuators(m.wx, m.wy, m.wz, m.ax, m.ay, m.f), command, h)
     s = 0.25 * h
@@ -184,7 +184,7 @@ def moved(xp: Any, r: Response, m: Motion, command: Command, air: Residual, h: f
     gy = f * (y * z - w * x + qy * qz - qw * qx) + air.y
     gz = f * (1.0 - x * x - y * y - qx * qx - qy * qy) + air.z - GRAVITY
     k = 0.5 * h * h
-    return Motion(
+    return ForecastMotion(
         m.px + h * m.vx + k * gx, m.py + h * m.vy + k * gy, m.pz + h * m.vz + k * gz,
         m.vx + h * gx, m.vy + h * gy, m.vz + h * gz,
         qw, qx, qy, qz, a.wx, a.wy, a.wz, a.ax, a.ay, a.f,

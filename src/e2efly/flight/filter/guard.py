@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.flight.filter.filter import Filter, Memory, feel, filtered, remember, watch
-from e2efly.flight.filter.forecast import Command
+from e2efly.flight.filter.filter import Filter, FilterMemory, feel, filtered, remember, watch
+from e2efly.flight.filter.forecast import ForecastCommand
 from e2efly.policy.odometry import Odometry
 
 
 @dataclass(frozen=True)
-class Change:
+class CommandChange:
     """How the filter changed a command."""
 
     limit: str
@@ -31,8 +31,8 @@ class FilterError(Exception):
 
 
 def keep(
-    filter: Filter, memory: Memory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
-) -> tuple[Ctbr, Change | None]:
+    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
+) -> tuple[Ctbr, CommandChange | None]:
     """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits.
 
     Args:
@@ -46,7 +46,7 @@ def keep(
     Raises:
         FilterError: if a number is not finite.
     """
-    told = Command(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
+    told = ForecastCommand(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
     try:
         found = filtered(filter, memory, odometry, now, told, floor=floor)
     except (ValueError, ArithmeticError) as error:
@@ -56,15 +56,15 @@ def keep(
     if found.share == 0.0:
         return wanted, None
     thrust, x, y, z = found.command
-    return Ctbr(thrust, Vec3(x, y, z)), Change(found.name, found.room, found.share, wanted)
+    return Ctbr(thrust, Vec3(x, y, z)), CommandChange(found.name, found.room, found.share, wanted)
 
 
-def sent(memory: Memory, command: Ctbr | None, now: float) -> Memory:
+def sent(memory: FilterMemory, command: Ctbr | None, now: float) -> FilterMemory:
     """The memory after a command was sent. None: the throttle was closed."""
     if command is None:
-        return remember(memory, Command(0.0, 0.0, 0.0, 0.0), now)
+        return remember(memory, ForecastCommand(0.0, 0.0, 0.0, 0.0), now)
     rate = command.rate
-    return remember(memory, Command(*(float(n) for n in (command.thrust, rate.x, rate.y, rate.z))), now)
+    return remember(memory, ForecastCommand(*(float(n) for n in (command.thrust, rate.x, rate.y, rate.z))), now)
 
 
 class Keeper:
@@ -72,8 +72,8 @@ class Keeper:
 
     def __init__(self, filter: Filter) -> None:
         """Filter for a vehicle in a fence."""
-        self.filter, self.memory = filter, Memory()
-        self.change: Change | None = None
+        self.filter, self.memory = filter, FilterMemory()
+        self.change: CommandChange | None = None
         """How the newest command was changed. None: not at all."""
         self.problem: str | None = None
         """Why it cannot filter. No policy flies then until the vehicle is on the ground. None: it can."""

@@ -7,7 +7,7 @@ from typing import Any
 from e2efly.flight.filter.arithmetic import Number, clip
 from e2efly.flight.filter.backup import TILT_MARGIN, TIMING, TURNING, WAY_GAINS, Backup, Brake, brake
 from e2efly.flight.filter.backup_path import Way, run_out, way
-from e2efly.flight.filter.forecast import Motion, Residual
+from e2efly.flight.filter.forecast import ForecastMotion, Residual
 from e2efly.flight.filter.obstacle import Obstacle, Plane, obstacles
 from e2efly.flight.settings import Fence
 
@@ -27,7 +27,7 @@ NAMES = (*WALLS, "speed", "tilt")
 
 
 @dataclass(frozen=True)
-class Limits:
+class MarginLimits:
     """Where the vehicle may be and how it may move. Lengths are in m, with the margins already subtracted."""
 
     low: tuple[float, float, float]
@@ -43,7 +43,7 @@ class Limits:
     """Distance to keep between the centre of mass and a solid."""
 
     @staticmethod
-    def of(fence: Fence, radius: float, margin: float) -> "Limits":
+    def of(fence: Fence, radius: float, margin: float) -> "MarginLimits":
         """The limits of a fence, for a vehicle with this radius, m, that stays inside by a margin, m.
 
         Raises:
@@ -51,13 +51,13 @@ class Limits:
         """
         (a, b, c), (d, e, f) = fence.low, fence.high
         m = margin
-        return Limits(
+        return MarginLimits(
             (a + m, b + m, c + m), (d - m, e - m, f - m), fence.speed - SPEED_MARGIN,
             fence.tilt - TILT_MARGIN if fence.tilt < math.pi else math.inf, obstacles(fence), radius + m,
         )  # fmt: skip
 
 
-def near(limits: Limits, m: Motion, reach: float) -> tuple[Plane, ...]:
+def near(limits: MarginLimits, m: ForecastMotion, reach: float) -> tuple[Plane, ...]:
     """The nearest sides of the solids within `reach` m. The distance to keep is subtracted from their gaps. Only for a
     single vehicle.
     """
@@ -68,12 +68,12 @@ def near(limits: Limits, m: Motion, reach: float) -> tuple[Plane, ...]:
 def rooms(
     xp: Any,
     b: Backup,
-    limits: Limits,
-    m: Motion,
+    limits: MarginLimits,
+    m: ForecastMotion,
     air: Residual,
     solids: tuple[Plane, ...] = (),
     floor: bool = True,
-    at: Motion | None = None,
+    at: ForecastMotion | None = None,
 ) -> tuple[Number, ...]:
     """The room that the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid. In m, negative
     beyond the limit.
@@ -117,7 +117,7 @@ def rooms(
     return tuple(found)
 
 
-def against(xp: Any, m: Motion, air: Residual) -> Residual:
+def against(xp: Any, m: ForecastMotion, air: Residual) -> Residual:
     """The part of the air's push that is counted while braking. A push that helps the braking may end as the speed
     falls, so it is not counted.
     """
@@ -128,7 +128,7 @@ def against(xp: Any, m: Motion, air: Residual) -> Residual:
     return Residual(x, y, z, air.share)
 
 
-def retreat(xp: Any, limits: Limits, m: Motion, floor: bool = True) -> tuple[Number, ...]:
+def retreat(xp: Any, limits: MarginLimits, m: ForecastMotion, floor: bool = True) -> tuple[Number, ...]:
     """The velocity back inside, world, m/s, in proportion to how far a state is beyond the margins or close to them."""
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
     z0 = z0 if floor else -math.inf
@@ -147,7 +147,7 @@ def _ends(xp: Any, places: tuple[Number, ...], tail: Number) -> tuple[Number, Nu
     return xp.minimum(low, end), xp.maximum(high, end)
 
 
-def _towards(xp: Any, w: Way, at: Motion, normal: tuple[float, ...], tail: tuple[Number, ...]) -> Number:
+def _towards(xp: Any, w: Way, at: ForecastMotion, normal: tuple[float, ...], tail: tuple[Number, ...]) -> Number:
     """How far the path goes in a direction."""
     nx, ny, nz = normal
     most = 0.0
@@ -157,7 +157,7 @@ def _towards(xp: Any, w: Way, at: Motion, normal: tuple[float, ...], tail: tuple
     return xp.maximum(most, nx * (x - at.px) + ny * (y - at.py) + nz * (z - at.pz))
 
 
-def _tilt_room(xp: Any, limits: Limits, k: Brake) -> Number:
+def _tilt_room(xp: Any, limits: MarginLimits, k: Brake) -> Number:
     """The room to the largest tilt. The thrust turns from c to t on a great circle. Between two directions within a
     cone, it stays within the cone.
     """

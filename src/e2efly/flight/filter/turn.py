@@ -12,7 +12,7 @@ TURN = sum(STEPS)
 """Duration of the turn, s."""
 
 
-class Step(NamedTuple):
+class TurnStep(NamedTuple):
     """A step of the turn: its length and the effect of the lags on it."""
 
     h: float
@@ -33,7 +33,7 @@ class Step(NamedTuple):
     """Whether the position after the step is compared with the limits."""
 
 
-def steps_of(r: Response) -> tuple[Step, ...]:
+def steps_of(r: Response) -> tuple[TurnStep, ...]:
     """The steps for a vehicle."""
     gain, steps, at = min(r.gain[:2]), [], 0.0
     for i, h in enumerate(STEPS):
@@ -41,7 +41,7 @@ def steps_of(r: Response) -> tuple[Step, ...]:
         at += h
         free = min(max(a + r.motor_time * c, 0.0), 1.0)  # for a rate of 1, with the rotors at rest
         steps.append(
-            Step(
+            TurnStep(
                 h,
                 at,
                 turning(gain, r.motor_time, h),

@@ -54,7 +54,7 @@ UNSURE_S = 0.015
 
 
 @dataclass(frozen=True)
-class Delay:
+class MeasuredDelay:
     """The delay of the odometry."""
 
     seconds: float
@@ -102,7 +102,7 @@ def turned(watch: DelayWatch, odometry: Odometry) -> DelayWatch:
     return replace(watch, angles=angles, attitude=odometry.quaternion)
 
 
-def delay_of(watch: DelayWatch) -> Delay | None:
+def delay_of(watch: DelayWatch) -> MeasuredDelay | None:
     """The delay of the odometry. None: the motion does not show it. This takes a fraction of a millisecond."""
     if len(watch.rates) < 2 or len(watch.angles) < 2:
         return None
@@ -133,10 +133,10 @@ def delay_of(watch: DelayWatch) -> Delay | None:
     deviation = math.sqrt(alike * float((left**2).mean()) / float((slope**2).sum())) / max(gain, 1e-9)
     if deviation > UNSURE_S:
         return None
-    return Delay(LATEST - GRID_S * (best + float(off)), deviation, float(likeness[best]))
+    return MeasuredDelay(LATEST - GRID_S * (best + float(off)), deviation, float(likeness[best]))
 
 
-def delay_problem(delay: Delay | None, accepted: float) -> str | None:
+def delay_problem(delay: MeasuredDelay | None, accepted: float) -> str | None:
     """The reason, in words, why nobody should fly with poses that are so late. None: they are not late, or the delay is
     unknown.
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot import inertial
-from e2efly.flight.pilot.delay_watch import Delay, DelayWatch, delay_of, delay_problem, felt, turned
+from e2efly.flight.pilot.delay_watch import DelayWatch, MeasuredDelay, delay_of, delay_problem, felt, turned
 from e2efly.flight.pilot.flight_state import GROUNDED, Flight, Mode
 from e2efly.flight.pilot.heading_watch import HeadingWatch, watched
 from e2efly.flight.pilot.hover import LIFTED, roll_pitch
 from e2efly.flight.pilot.inertial import Inertial, Measurement
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pace import Pace, paced
-from e2efly.flight.pose.tracking import Track, age, track
+from e2efly.flight.pose.tracking import PoseTrack, age, track
 from e2efly.policy.odometry import Odometry, Sample
 
 RESTART_S = 1.0
@@ -30,7 +30,7 @@ FROZEN = "its numbers do not change"
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StateEstimate:
     """The vehicle's motion as far as it is known, and the problems found with poses and sensors."""
 
     checks: Checks
@@ -45,7 +45,7 @@ class Estimate:
     """Why poses are refused now. None: they are not refused, or for less than `OUTLIERS_S`."""
     stale: str | None = None
     """Why the newest pose is too old. None: it is not."""
-    track: Track = Track()
+    track: PoseTrack = PoseTrack()
     """Memory of the checks of poses."""
     pace: Pace = Pace()
     """How often poses come."""
@@ -55,7 +55,7 @@ class Estimate:
     """Accelerometer, gyroscope, and the velocity without poses."""
     delays: DelayWatch = DelayWatch()
     """Rotations from poses and gyroscope on the ground, with which the delay of the poses is measured."""
-    delay: Delay | None = None
+    delay: MeasuredDelay | None = None
     """The delay of the poses. None: not measured."""
     opposed: str | None = None
     """How poses and sensors contradicted each other when the vehicle was carried. Kept until they agree."""
@@ -107,8 +107,13 @@ def height_of(odometry: Odometry | None, flight: Flight) -> float:
 
 
 def see(
-    before: Estimate, samples: Iterable[Sample], flight: Flight, attitude: Attitude | None, now: float, said: str = ""
-) -> Estimate:
+    before: StateEstimate,
+    samples: Iterable[Sample],
+    flight: Flight,
+    attitude: Attitude | None,
+    now: float,
+    said: str = "",
+) -> StateEstimate:
     """The estimate after the poses of a control step.
 
     Args:
@@ -122,7 +127,7 @@ def see(
     after = before
     waited = before.refused and now - before.good_at > RESTART_S
     if flight.mode in GROUNDED and (before.track.fault or waited):
-        after = replace(after, track=Track(), good_at=now)  # it may have been carried away, or its clock set
+        after = replace(after, track=PoseTrack(), good_at=now)  # it may have been carried away, or its clock set
     for sample in samples:
         tracked, odometry, refused = track(after.checks, after.track, sample)
         after = replace(after, track=tracked, refused=refused)
@@ -138,8 +143,8 @@ def see(
 
 
 def _accept(
-    before: Estimate, odometry: Odometry, received: float, flight: Flight, attitude: Attitude | None, now: float
-) -> Estimate:
+    before: StateEstimate, odometry: Odometry, received: float, flight: Flight, attitude: Attitude | None, now: float
+) -> StateEstimate:
     """The estimate after a pose that passed the checks."""
     heading = before.heading
     if attitude is not None:
@@ -157,7 +162,7 @@ def _accept(
     )  # fmt: skip
 
 
-def _continues(before: Estimate, odometry: Odometry, flight: Flight) -> bool:
+def _continues(before: StateEstimate, odometry: Odometry, flight: Flight) -> bool:
     """Whether an odometry may correct the velocity. In a landing without poses, only one that continues it may: what
     comes back after a loss may be wrong.
     """
@@ -167,7 +172,7 @@ def _continues(before: Estimate, odometry: Odometry, flight: Flight) -> bool:
     return abs(float(odometry.velocity[2]) - reckoned.climb) <= CONTINUES + reckoned.doubt
 
 
-def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:
+def compare(before: StateEstimate, mode: Mode, *, measure_delay: bool) -> StateEstimate:
     """On the ground: a contradiction that was found while the vehicle was carried stays until it is carried again and
     agrees.
 
@@ -188,7 +193,7 @@ def compare(before: Estimate, mode: Mode, *, measure_delay: bool) -> Estimate:
     return replace(before, opposed=opposed, delay=delay)
 
 
-def feel(before: Estimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> Estimate:
+def feel(before: StateEstimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> StateEstimate:
     """The estimate after a reply of the inertial sensors.
 
     Args:
@@ -203,7 +208,7 @@ def feel(before: Estimate, m: Measurement, turned_at: float, mode: Mode, now: fl
     return replace(before, delays=delays, inertial=inertial.measure(before.inertial, m, now))
 
 
-def enter(before: Estimate, flight_before: Flight, flight: Flight) -> Estimate:
+def enter(before: StateEstimate, flight_before: Flight, flight: Flight) -> StateEstimate:
     """The estimate after a step of the state machine, which resets what a new mode or a landing without poses starts
     again.
     """

@@ -12,7 +12,7 @@ METHODS = ("refused", "problem", "read", "close", "describe")
 
 
 @dataclass(frozen=True)
-class Kind:
+class PoseKind:
     """A kind of pose source."""
 
     open: Callable[[str], PoseSource]
@@ -21,7 +21,7 @@ class Kind:
     """How the text for the source is written."""
 
 
-SOURCES: Registry[Kind] = Registry("pose source", source=lambda kind: kind.open)
+SOURCES: Registry[PoseKind] = Registry("pose source", source=lambda kind: kind.open)
 """The kinds of pose sources."""
 
 F = TypeVar("F", bound=Callable[[str], PoseSource])
@@ -41,10 +41,10 @@ def register(name: str, form: str) -> Callable[[F], F]:
     Raises:
         ValueError: if the name is taken.
     """
-    return SOURCES.adding(name, lambda opener: Kind(opener, form))
+    return SOURCES.adding(name, lambda opener: PoseKind(opener, form))
 
 
-def opened(kind: Kind, text: str, where: str) -> PoseSource:
+def opened(kind: PoseKind, text: str, where: str) -> PoseSource:
     """Open a source of a kind.
 
     Raises:

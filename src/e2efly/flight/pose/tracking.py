@@ -23,7 +23,7 @@ LARGEST_STAMP = 1e11
 
 
 @dataclass(frozen=True)
-class Track:
+class PoseTrack:
     """What is remembered of the samples so far. Use `Track()` before the first sample, and to start again after a
     lasting fault.
     """
@@ -57,12 +57,12 @@ class Track:
     """Reason for a fault that only a new `Track()` ends."""
 
 
-def age(track: Track, now: float) -> float:
+def age(track: PoseTrack, now: float) -> float:
     """Age of the last odometry, s. Infinite before the first one. `now` is on the local monotonic clock, s."""
     return now - track.odometry.time if track.odometry is not None else math.inf
 
 
-def track(checks: Checks, track: Track, sample: Sample) -> tuple[Track, Odometry | None, str | None]:
+def track(checks: Checks, track: PoseTrack, sample: Sample) -> tuple[PoseTrack, Odometry | None, str | None]:
     """Check one sample and estimate what it does not contain.
 
     Args:
@@ -128,7 +128,7 @@ def _content(checks: Checks, sample: Sample) -> str | None:
     return None
 
 
-def _time(checks: Checks, track: Track, sample: Sample) -> tuple[ClockMap | None, float, str | None]:
+def _time(checks: Checks, track: PoseTrack, sample: Sample) -> tuple[ClockMap | None, float, str | None]:
     """The map of the clock, the time of the sample on the local clock, s, and the reason for a refusal."""
     clock, last = track.clock, track.pose[0] if track.pose is not None else -math.inf
     time = sample.received - checks.latency
@@ -157,7 +157,7 @@ def _time(checks: Checks, track: Track, sample: Sample) -> tuple[ClockMap | None
     return followed, time, None
 
 
-def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[Track, str | None]:
+def _frozen(checks: Checks, track: PoseTrack, sample: Sample, time: float) -> tuple[PoseTrack, str | None]:
     bits = sample.position.tobytes() + sample.quaternion.tobytes()
     if bits != track.same_pose:
         return replace(track, same_pose=bits, same_since=time), None
@@ -168,8 +168,8 @@ def _frozen(checks: Checks, track: Track, sample: Sample, time: float) -> tuple[
 
 
 def _jump(
-    checks: Checks, track: Track, time: float, position: np.ndarray, quaternion: np.ndarray
-) -> tuple[Track, str | None]:
+    checks: Checks, track: PoseTrack, time: float, position: np.ndarray, quaternion: np.ndarray
+) -> tuple[PoseTrack, str | None]:
     """Refuse a pose that the vehicle cannot have reached by flight. A jump that lasts becomes a fault.
 
     The allowance grows with time, so a lasting jump would be accepted by itself after some samples. Both the pose
@@ -213,7 +213,7 @@ def _apart(pose: tuple[float, np.ndarray, np.ndarray], position: np.ndarray, qua
 
 
 def _led_on(
-    track: Track, pose: tuple[float, np.ndarray, np.ndarray], time: float
+    track: PoseTrack, pose: tuple[float, np.ndarray, np.ndarray], time: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """The pose extrapolated to `time` s, if the motion goes on as in the last odometry."""
     if track.odometry is None:
@@ -236,8 +236,8 @@ def _led_on(
 
 
 def _motion(
-    checks: Checks, track: Track, sample: Sample, time: float, position: np.ndarray, quaternion: np.ndarray
-) -> tuple[Track, Odometry | None, str | None]:
+    checks: Checks, track: PoseTrack, sample: Sample, time: float, position: np.ndarray, quaternion: np.ndarray
+) -> tuple[PoseTrack, Odometry | None, str | None]:
     """The odometry of a good sample. Velocities are the source's, if it gives them, or otherwise estimated."""
     velocity_rate, body_rate_rate = (2 * math.pi * f for f in (checks.velocity_cutoff, checks.rate_cutoff))
     shift, turn, before = track.velocity, track.body_rate, track.pose
@@ -275,8 +275,12 @@ def _motion(
 
 
 def _strayed(
-    checks: Checks, track: Track, before: tuple[float, np.ndarray, np.ndarray], velocity: np.ndarray, seen: np.ndarray
-) -> tuple[Track, str | None]:
+    checks: Checks,
+    track: PoseTrack,
+    before: tuple[float, np.ndarray, np.ndarray],
+    velocity: np.ndarray,
+    seen: np.ndarray,
+) -> tuple[PoseTrack, str | None]:
     """Refuse a velocity that is too slow, zero, negated or in other axes: its path differs from the positions' path."""
     assert track.pose is not None
     dt = track.pose[0] - before[0]

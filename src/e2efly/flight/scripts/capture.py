@@ -23,7 +23,7 @@ OTHER_CLOCK_S = 10.0
 """If the stamp of the first image is farther from now than this, s, it comes from another clock."""
 
 
-class Output:
+class ImageOutput:
     """Publishes the images that a kind of source delivers."""
 
     def __init__(self, speech: Any, name: str, sees: str, fov: str) -> None:
@@ -102,7 +102,7 @@ def run(module: str, function: str) -> Any:
     """
 
     def started(speech: Any, name: str, sees: str, fov: str, where: str) -> None:
-        getattr(importlib.import_module(module), function)(Output(speech, name, sees, fov), where)
+        getattr(importlib.import_module(module), function)(ImageOutput(speech, name, sees, fov), where)
 
     return started
 

@@ -79,7 +79,7 @@ def follow(output: Any, rs: Any, device: Any, begun: Any) -> None:
         2 * math.atan(size / (2 * focal))
         for size, focal in ((intrinsics.width, intrinsics.fx), (intrinsics.height, intrinsics.fy))
     )
-    clock = Clock(output.speech)
+    clock = CameraClock(output.speech)
     name = device.get_info(rs.camera_info.name) if device.supports(rs.camera_info.name) else "camera"
     detail = f"{name}, pyrealsense2 {rs.__version__}" if hasattr(rs, "__version__") else name
     while not output.speech.closing.is_set():
@@ -121,7 +121,7 @@ def values_of(data: Any, scale: float | None) -> tuple[bytes, tuple[int, ...], s
     return (image * np.float32(scale)).astype("<f4").tobytes(), image.shape, "float32"
 
 
-class Clock:
+class CameraClock:
     """Converts the timestamps of frames to times on the monotonic clock.
 
     The origin of the camera's own clock is not known. The offset between the clocks is taken from the frame that came

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.sight.quality import Seen, see
+from e2efly.flight.sight.quality import SeenImages, see
 from e2efly.flight.sight.segment import chosen, opencv
 from e2efly.policy.images import NONE, Image
 
@@ -64,13 +64,13 @@ def capture(output: Any, where: str) -> None:
     opencv().setNumThreads(1)  # more would take the cores of the control loop
     source, told = open_image(asked["uri"], camera), None
     try:
-        seen = Seen(camera)
+        seen = SeenImages(camera)
         while not output.speech.closing.is_set():
             now = time.monotonic()
             frames = source.read(now)[-1:]
             if frames and seen.frame is None:
                 height, width = frames[0].image.shape[:2]
-                seen = Seen(dataclasses.replace(camera, height=height, width=width))
+                seen = SeenImages(dataclasses.replace(camera, height=height, width=width))
             seen = see(seen, frames, now, trouble=source.problem)
             problem = seen.problem(now) if frames else source.problem
             if problem != told and problem:

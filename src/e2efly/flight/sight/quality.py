@@ -40,7 +40,7 @@ image."""
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenImages:
     """What is known about one camera of a policy."""
 
     camera: Image
@@ -90,13 +90,13 @@ _EMPTY = {
 
 
 def see(
-    seen: Seen,
+    seen: SeenImages,
     frames: Iterable[Frame],
     now: float,
     odometry: Odometry | None = None,
     ground: float = 0.0,
     trouble: str | None = None,
-) -> Seen:
+) -> SeenImages:
     """Process new frames, oldest first.
 
     Args:
@@ -129,7 +129,7 @@ def see(
     return seen
 
 
-def _fault(seen: Seen, frame: Frame, now: float) -> str | None:
+def _fault(seen: SeenImages, frame: Frame, now: float) -> str | None:
     if frame.time > now + AHEAD_S:
         return f"was exposed {1e3 * (frame.time - now):.0f} ms from now; accepted: times by this machine's clock"
     if seen.frame is not None and frame.time <= seen.frame.time:

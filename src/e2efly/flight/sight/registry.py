@@ -17,7 +17,7 @@ resamples its images. Raises ValueError that says what is accepted."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class ImageKind:
     """A kind of image source."""
 
     open: Opener
@@ -26,7 +26,7 @@ class Kind:
     """How the text for the source is written."""
 
 
-SOURCES: Registry[Kind] = Registry("image source", source=lambda kind: kind.open)
+SOURCES: Registry[ImageKind] = Registry("image source", source=lambda kind: kind.open)
 """The kinds of image sources."""
 
 F = TypeVar("F", bound=Opener)
@@ -42,10 +42,10 @@ def register(name: str, form: str) -> Callable[[F], F]:
     Raises:
         ValueError: if the name is taken.
     """
-    return SOURCES.adding(name, lambda opener: Kind(opener, form))
+    return SOURCES.adding(name, lambda opener: ImageKind(opener, form))
 
 
-def opened(kind: Kind, where: str, image: Image) -> ImageSource:
+def opened(kind: ImageKind, where: str, image: Image) -> ImageSource:
     """Open a source of a kind.
 
     Raises:

@@ -7,19 +7,19 @@ import onnx
 from onnx import numpy_helper
 
 from e2efly.policy.c_export.operators import OF_CONSTANTS, OPERATORS
-from e2efly.policy.c_export.program import Operand, Program
+from e2efly.policy.c_export.program import CProgram, Operand
 
 
 @dataclass(frozen=True)
-class Network:
+class CNetwork:
     """A policy's graph as a program."""
 
-    program: Program
+    program: CProgram
     outputs: dict[str, Operand]
     """The outputs by name."""
 
 
-def network(content: bytes, inputs: Mapping[str, Operand]) -> Network:
+def network(content: bytes, inputs: Mapping[str, Operand]) -> CNetwork:
     """The program of a policy's graph, for one observation.
 
     Args:
@@ -30,7 +30,7 @@ def network(content: bytes, inputs: Mapping[str, Operand]) -> Network:
         ValueError: for an operator that is used in a way that C is not written for, naming it and its node.
     """
     graph = onnx.load_model_from_string(content).graph
-    program, known = Program(), dict(inputs)
+    program, known = CProgram(), dict(inputs)
     for tensor in graph.initializer:
         value = numpy_helper.to_array(tensor)
         known[tensor.name] = Operand("", value.shape, value=value)
@@ -38,10 +38,10 @@ def network(content: bytes, inputs: Mapping[str, Operand]) -> Network:
         where = f"node {node.output[0]!r} of the graph"
         for output, operand in zip(node.output, _outputs(where, node, known, program), strict=True):
             known[output] = operand
-    return Network(program, {output.name: known[output.name] for output in graph.output})
+    return CNetwork(program, {output.name: known[output.name] for output in graph.output})
 
 
-def _outputs(where: str, node: onnx.NodeProto, known: Mapping[str, Operand], program: Program) -> list[Operand]:
+def _outputs(where: str, node: onnx.NodeProto, known: Mapping[str, Operand], program: CProgram) -> list[Operand]:
     try:
         given = [known[name] for name in node.input if name]
         raw = 1 if node.op_type in OF_CONSTANTS else len(given)

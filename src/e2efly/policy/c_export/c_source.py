@@ -20,7 +20,7 @@ from e2efly.policy.c_export.header import (
     past_actions,
     sizes,
 )
-from e2efly.policy.c_export.program import Operand, Program, layout
+from e2efly.policy.c_export.program import CProgram, Operand, layout
 from e2efly.policy.c_export.text import array, comment, number
 from e2efly.policy.contract import ACTION_SIZE, Contract
 from e2efly.policy.images import ROUNDING as IMAGE_ROUNDING
@@ -79,7 +79,7 @@ def _images(contract: Contract) -> str:
     return "".join(f" const float *{image_name(image.name)}," for image in contract.images)
 
 
-def _network(c: Contract, name: str, program: Program, places: list[int], outputs: dict[str, Operand]) -> str:
+def _network(c: Contract, name: str, program: CProgram, places: list[int], outputs: dict[str, Operand]) -> str:
     big = name.upper()
     lines = [
         f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
@@ -111,7 +111,7 @@ def _network(c: Contract, name: str, program: Program, places: list[int], output
     return "\n".join([*lines, f"    return {big}_OK;", "}\n"])
 
 
-def _is_used(program: Program, buffer: int) -> bool:
+def _is_used(program: CProgram, buffer: int) -> bool:
     return any(buffer == step.writes for step in program.steps)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from onnx import NodeProto, helper
 
-from e2efly.policy.c_export.program import Operand, Program, Shape
+from e2efly.policy.c_export.program import CProgram, Operand, Shape
 from e2efly.policy.c_export.text import number
 
 Given = Sequence[Operand]
@@ -19,7 +19,7 @@ def attributes(node: NodeProto) -> dict[str, Any]:
     return {entry.name: helper.get_attribute_value(entry) for entry in node.attribute}
 
 
-def norm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def norm(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     """The square root of the sum of the squares of an image."""
     (x,) = given
     out = program.buffer((1,) * len(x.shape))
@@ -40,7 +40,7 @@ def _window(node: NodeProto, x: Operand) -> tuple[list[int], list[int], Shape]:
     return list(sides), strides, places
 
 
-def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def pool(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     """The maximum or the mean of each window of an image."""
     (x,) = given
     (h, w), (down, right), (rows, columns) = _window(node, x)
@@ -64,7 +64,7 @@ def pool(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def convolution(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def convolution(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     """Convolution: sums over windows of an image, weighted by filters."""
     x, kernel, bias = given
     assert kernel.value is not None

@@ -14,7 +14,7 @@ from itertools import accumulate
 from onnx import NodeProto
 
 from e2efly.policy.c_export.image_operators import Given, attributes, convolution, norm, pool
-from e2efly.policy.c_export.program import Operand, Program, Shape
+from e2efly.policy.c_export.program import CProgram, Operand, Shape
 from e2efly.policy.c_export.text import number
 
 UNARY = {
@@ -43,7 +43,7 @@ BLOCK = 4
 """Number of matrix rows that are added at once. An output is then read and written only once per this many rows."""
 
 
-def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, expression: str) -> list[Operand]:
+def _each(node: NodeProto, program: CProgram, shape: Shape, reads: Given, expression: str) -> list[Operand]:
     """Add a step that computes its output element by element."""
     out = program.buffer(shape)
     whole = {operand.buffer for operand in reads if operand.size == out.size}
@@ -54,25 +54,25 @@ def _each(node: NodeProto, program: Program, shape: Shape, reads: Given, express
     return [out]
 
 
-def _unary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _unary(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     (x,) = given
     form, default = SLOPED.get(node.op_type) or (UNARY[node.op_type], None)
     alpha = default and number(attributes(node).get("alpha", default))
     return _each(node, program, x.shape, given, form.format(x.at("i"), alpha=alpha))
 
 
-def _binary(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _binary(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     shape = _common(given)
     return _each(node, program, shape, given, BINARY[node.op_type].format(*(x.at("i") for x in given)))
 
 
-def _where(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _where(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     condition, a, b = given
     expression = f"{condition.at('i')} > 0.0f ? {a.at('i')} : {b.at('i')}"
     return _each(node, program, _common(given), given, expression)
 
 
-def _clip(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _clip(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     x = given[0]
     v, a, b = (operand.at("i") for operand in given)
     return _each(node, program, x.shape, given, f"{v} < {a} ? {a} : {v} > {b} ? {b} : {v}")
@@ -91,12 +91,12 @@ def _tight(shape: Shape) -> Shape:
     return tuple(n for n in shape if n != 1)
 
 
-def _identity(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _identity(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     del node, program
     return list(given)
 
 
-def _gemm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _gemm(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     """A matrix product, computed row by row of the matrix, so that the compiler can vectorise over the outputs."""
     x, matrix, bias = given
     assert matrix.value is not None
@@ -121,7 +121,7 @@ def _gemm(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def _matmul(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _matmul(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     a, b = given
     (m, k), n = a.shape, b.shape[1]
     out = program.buffer((m, n))
@@ -133,7 +133,7 @@ def _matmul(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def _gather(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _gather(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     x, index = given
     assert index.value is not None
     places = [int(i) for i in index.value]
@@ -145,14 +145,14 @@ def _gather(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def _reshape(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _reshape(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     del node, program
     x, wanted = given
     assert wanted.value is not None
     return [replace(x, shape=tuple(x.shape[i] if n == 0 else int(n) for i, n in enumerate(wanted.value[1:])))]
 
 
-def _transpose(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _transpose(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     (x,) = given
     axes = [axis - 1 for axis in attributes(node)["perm"][1:]]
     shape = tuple(x.shape[axis] for axis in axes)
@@ -172,7 +172,7 @@ def _strides(shape: Shape) -> list[int]:
     return [math.prod(shape[i + 1 :]) for i in range(len(shape))]
 
 
-def _concat(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _concat(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     out = program.buffer((sum(x.shape[0] for x in given), *given[0].shape[1:]))
     starts = accumulate((x.size for x in given), initial=0)
     lines = [
@@ -184,14 +184,14 @@ def _concat(node: NodeProto, given: Given, program: Program) -> list[Operand]:
     return [out]
 
 
-def _split(node: NodeProto, given: Given, program: Program) -> list[Operand]:
+def _split(node: NodeProto, given: Given, program: CProgram) -> list[Operand]:
     del program
     x, count = given[0], len(node.output)
     shape = (x.shape[0] // count, *x.shape[1:])
     return [replace(x, text=f"({x.text} + {part * math.prod(shape)})", shape=shape) for part in range(count)]
 
 
-OPERATORS: dict[str, Callable[[NodeProto, Given, Program], list[Operand]]] = (
+OPERATORS: dict[str, Callable[[NodeProto, Given, CProgram], list[Operand]]] = (
     dict.fromkeys([*UNARY, *SLOPED], _unary)
     | dict.fromkeys(BINARY, _binary)
     | dict.fromkeys(["MaxPool", "AveragePool"], pool)

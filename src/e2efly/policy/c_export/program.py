@@ -33,7 +33,7 @@ class Operand:
 
 
 @dataclass(frozen=True)
-class Step:
+class CStep:
     """Statements that fill one buffer."""
 
     about: str
@@ -48,10 +48,10 @@ class Step:
 
 
 @dataclass
-class Program:
+class CProgram:
     """Collects the steps and the constants of a program."""
 
-    steps: list[Step] = field(default_factory=list)
+    steps: list[CStep] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
     """Count of numbers in each buffer."""
     floats: dict[str, np.ndarray] = field(default_factory=dict)
@@ -95,10 +95,10 @@ class Program:
         """Add a step."""
         read = frozenset(operand.buffer for operand in reads if operand.buffer is not None)
         assert writes.buffer is not None
-        self.steps.append(Step(about, lines, read, writes.buffer, in_place))
+        self.steps.append(CStep(about, lines, read, writes.buffer, in_place))
 
 
-def layout(program: Program, kept: Iterable[int]) -> tuple[list[int], int]:
+def layout(program: CProgram, kept: Iterable[int]) -> tuple[list[int], int]:
     """Place the buffers in memory so that buffers that are needed at the same time do not overlap.
 
     A step that can work in place overwrites a buffer of the same size that no later step reads. Every other step uses

@@ -37,7 +37,7 @@ class Battery:
 
 
 @dataclass(frozen=True)
-class Plant:
+class Airframe:
     """Parameters of the vehicle's motion, split into arrays of the batch's shape, with values derived from them.
 
     It is made once per control step. If every vehicle has its own parameters, most of a sub-step's time would otherwise
@@ -92,7 +92,7 @@ class Plant:
     """Centre of mass relative to the point where the drag acts, body, m."""
 
     @staticmethod
-    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Plant":
+    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Airframe":
         """The plant of a vehicle, any field of which may be batched.
 
         Sub-steps take `dt` seconds, and `rotor_share` is (*n, 4).
@@ -106,7 +106,7 @@ class Plant:
         mobility, mobility_products = Vec3.of(1 / v.inertia), None
         if products is not None:
             mobility, mobility_products = _inverse(inertia, products)
-        return Plant(
+        return Airframe(
             thrust_map=(k2, k1, k0),
             arm_x=split4(x),
             arm_y=split4(y),

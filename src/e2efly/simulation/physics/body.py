@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from e2efly.control.vectors import Quat, Vec3
-from e2efly.simulation.physics.airframe import Plant, Rotors
+from e2efly.simulation.physics.airframe import Airframe, Rotors
 from e2efly.simulation.physics.state import Parts
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
@@ -14,7 +14,7 @@ from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
 
 
-def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
+def rotor_thrust(plant: Airframe, rotor_speed: Rotors) -> Rotors:
     """Thrust of each rotor, N: the quadratic thrust map, never negative, times the rotor's share."""
     k2, k1, k0 = plant.thrust_map
     a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
@@ -24,7 +24,7 @@ def rotor_thrust(plant: Plant, rotor_speed: Rotors) -> Rotors:
     return a * s[0], b * s[1], c * s[2], d * s[3]
 
 
-def powered(plant: Plant, rotor_speed: Rotors, command: Rotors) -> Rotors:
+def powered(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
     """Speeds, rad/s, that rotors approach under speed commands, at the battery voltage under their present thrust."""
     battery = plant.battery
     if battery is None:
@@ -52,14 +52,14 @@ def hover_rotor_speed(vehicle: Vehicle) -> Array:
     return rotor_speed_for(vehicle, (f, f, f, f))[0]
 
 
-def rotor_wrench(plant: Plant, thrust: Rotors) -> tuple[Array, Vec3]:
+def rotor_wrench(plant: Airframe, thrust: Rotors) -> tuple[Array, Vec3]:
     """Collective thrust along body z, N, and torque about the body axes, N*m, from rotor arms and reaction torques."""
     collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
     roll, pitch = _weighted(plant.arm_y, thrust), -_weighted(plant.arm_x, thrust)
     return collective, Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
 
 
-def drag(plant: Plant, air_velocity: Vec3) -> Vec3:
+def drag(plant: Airframe, air_velocity: Vec3) -> Vec3:
     """Drag in the body frame, N: -(k1 v + k2 v |v|) per axis of the body-frame air-relative velocity, m/s.
 
     The paper writes k v v, which has no sign and pushes a vehicle that flies backwards.
@@ -73,13 +73,13 @@ def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
     return attitude.unrotate(velocity if wind is None else velocity - wind)
 
 
-def acceleration(plant: Plant, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
+def acceleration(plant: Airframe, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
     """Acceleration of the centre of mass, world, m/s^2, from the drag, body, N, and the collective thrust, N."""
     a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
     return Vec3(a.x, a.y, a.z - GRAVITY)
 
 
-def angular_acceleration(plant: Plant, body_rate: Vec3, torque: Vec3) -> Vec3:
+def angular_acceleration(plant: Airframe, body_rate: Vec3, torque: Vec3) -> Vec3:
     """Euler's equation in the body frame, rad/s^2: J^-1 (torque - w x J w)."""
     left = torque - gyroscopic_torque(plant.inertia, body_rate, plant.products)
     return tensor_times(plant.mobility, plant.mobility_products, left)
@@ -118,7 +118,7 @@ def rotor_momentum_torque(
 
 
 def accelerations(
-    plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
+    plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
 ) -> tuple[Vec3, Vec3]:
     """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
 
@@ -145,7 +145,7 @@ def accelerations(
     return linear, angular_acceleration(plant, parts.body_rate, torque)
 
 
-def derivative(plant: Plant, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
+def derivative(plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
     """Time derivative of the body's state. Arguments are as for `accelerations`.
 
     The entry of the rotor speeds is zero.

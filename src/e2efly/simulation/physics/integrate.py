@@ -9,11 +9,11 @@ import numpy as np
 from jax import Array
 
 from e2efly.control.vectors import Vec3
-from e2efly.simulation.physics.airframe import Plant, Rotors
+from e2efly.simulation.physics.airframe import Airframe, Rotors
 from e2efly.simulation.physics.body import accelerations, derivative
 from e2efly.simulation.physics.state import Parts
 
-Integrator = Callable[[Plant, Parts, Rotors, Vec3 | None, float], Parts]
+Integrator = Callable[[Airframe, Parts, Rotors, Vec3 | None, float], Parts]
 """(plant, state, rotor speed commands, wind, step in s) -> state one step later."""
 
 
@@ -35,14 +35,14 @@ def lagged(
     return a, b, c, d
 
 
-def euler(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def euler(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Explicit Euler: all derivatives at the start of the step. First order."""
     speed = lagged(parts.rotor_speed, command, plant.decay, plant.decay_down)
     moved = _advance(parts, derivative(plant, parts, wind, _mean_change(plant, parts.rotor_speed, speed, dt)), dt)
     return _finish(moved, speed)
 
 
-def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def semi_implicit(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Semi-implicit (symplectic) Euler: first the velocities, then poses from the new velocities.
 
     First order, most stable.
@@ -61,7 +61,7 @@ def semi_implicit(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None
     )
 
 
-def rk3(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def rk3(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Kutta's method with the exact rotor speeds at the start, middle and end of the step. Third order.
 
     Source: W. Kutta, "Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen", 1901.
@@ -76,7 +76,7 @@ def rk3(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: floa
     return _finish(_advance(parts, mean, dt), end)
 
 
-def rk4(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
+def rk4(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:
     """Classical Runge-Kutta method with the exact rotor speeds at the start, middle and end of the step.
 
     Fourth order.
@@ -92,7 +92,7 @@ def rk4(plant: Plant, parts: Parts, command: Rotors, wind: Vec3 | None, dt: floa
     return _finish(_advance(parts, mean, dt), end)
 
 
-def _rate(plant: Plant, parts: Parts, rotor_speed: Rotors, command: Rotors, wind: Vec3 | None) -> Parts:
+def _rate(plant: Airframe, parts: Parts, rotor_speed: Rotors, command: Rotors, wind: Vec3 | None) -> Parts:
     change = None
     if plant.rotor_inertia is not None and plant.lag_rate is not None:
         up, down = plant.lag_rate, plant.lag_rate_down
@@ -102,7 +102,7 @@ def _rate(plant: Plant, parts: Parts, rotor_speed: Rotors, command: Rotors, wind
     return derivative(plant, dataclasses.replace(parts, rotor_speed=rotor_speed), wind, change)
 
 
-def _mean_change(plant: Plant, before: Rotors, after: Rotors, dt: float) -> Rotors | None:
+def _mean_change(plant: Airframe, before: Rotors, after: Rotors, dt: float) -> Rotors | None:
     """Mean acceleration of the rotors over a step, rad/s^2, where the plant needs it.
 
     It gives the exact change of momentum.

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from e2efly.config.names import unknown
 from e2efly.control import COMMAND_MODES, Vec3
-from e2efly.simulation.physics.airframe import Plant
+from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import powered
 from e2efly.simulation.physics.control import Command, control_law, remembering_law
 from e2efly.simulation.physics.integrate import INTEGRATORS
@@ -141,7 +141,7 @@ def step(
     state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
-    plant = Plant.of(vehicle, dt, rotor_share)
+    plant = Airframe.of(vehicle, dt, rotor_share)
     controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
     after = split4(command)

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from e2efly.simulation.scenes.nearest_hits import Kinds, Sight, depth, ground, hits, sight
+from e2efly.simulation.scenes.nearest_hits import Kinds, TileSight, depth, ground, hits, sight
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.simulation.scenes.shade import Hits, Light, squares, usual_light
 from e2efly.simulation.scenes.shapes import FAR
@@ -61,7 +61,7 @@ def cast(
     tiles, indices = jnp.asarray(pattern.tiles), jnp.arange(pattern.tiles.shape[0])
     serial = jax.default_backend() == "cpu"
 
-    def camera(given: tuple[Sight, Light | None]) -> dict[str, Array]:
+    def camera(given: tuple[TileSight, Light | None]) -> dict[str, Array]:
         def tile(index: Array) -> dict[str, Array]:
             return _tile(*given, kinds, index, tiles[index], channels)
 
@@ -72,7 +72,7 @@ def cast(
 
 
 def _tile(
-    seen: Sight, light: Light | None, kinds: Kinds, index: Array, d: Float[Array, "3 r"], channels: tuple[str, ...]
+    seen: TileSight, light: Light | None, kinds: Kinds, index: Array, d: Float[Array, "3 r"], channels: tuple[str, ...]
 ) -> dict[str, Array]:
     """The channels of one tile as planes, with one value per ray."""
     if set(channels) == {"depth"}:

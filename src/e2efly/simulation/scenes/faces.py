@@ -17,7 +17,7 @@ _SIDES = 20
 
 
 @dataclass(frozen=True)
-class Body:
+class FacesBody:
     """A solid in the form in which it is drawn."""
 
     quads: Quads
@@ -47,7 +47,7 @@ class Body:
         return points[ConvexHull(points).vertices]
 
 
-def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = False) -> list[Body]:
+def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = False) -> list[FacesBody]:
     """The solids of one world at a time, s.
 
     Args:
@@ -72,7 +72,7 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             angle = np.append(rate[i] * time, np.linspace(0, 2 * np.pi, 49))[:, None]
             way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
             moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
-            found.append(Body(quads + way[0], colour[i], way[1:] if moves else None, float(rate[i])))
+            found.append(FacesBody(quads + way[0], colour[i], way[1:] if moves else None, float(rate[i])))
     return found
 
 

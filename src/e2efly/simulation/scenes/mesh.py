@@ -8,14 +8,14 @@ from jaxtyping import Float, Int
 
 from e2efly.courses.solids import DISC, SQUARE
 from e2efly.simulation.physics.rotation import to_matrix
-from e2efly.simulation.scenes.meshes.mesh_scene import Part
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart
 from e2efly.simulation.scenes.scene import Scene
 
 GROUND = 500.0
 """Half the side of the square that represents the ground, m."""
 
 
-def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
+def parts(scene: Scene, world: int, segments: int = 64) -> list[MeshPart]:
     """One world as the parts of a `MeshScene`.
 
     The ground comes first, then the solids in the order of their instance numbers.
@@ -29,7 +29,7 @@ def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
     ground = float(scene.ground[world])
     if ground > -GROUND:
         corners = GROUND * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) + [0.0, 0.0, ground]
-        found.append(Part("ground", corners, np.array([[0, 1, 2], [0, 2, 3]])))
+        found.append(MeshPart("ground", corners, np.array([[0, 1, 2], [0, 2, 3]])))
     for kind in scene.kinds:
         solids = scene.solids[kind]
         turned = np.asarray(to_matrix(solids.quaternion[world]), np.float64)
@@ -39,7 +39,7 @@ def parts(scene: Scene, world: int, segments: int = 64) -> list[Part]:
             mesh: Any = trimesh.util.concatenate(_meshes(kind, np.asarray(solids.size[world, i], np.float64), segments))
             mesh.apply_transform(pose)
             look = {"colour": np.asarray(solids.colour[world, i]), "label": int(solids.label[world, i])}
-            found.append(Part(f"{kind} {i}", np.asarray(mesh.vertices), np.asarray(mesh.faces), **look))
+            found.append(MeshPart(f"{kind} {i}", np.asarray(mesh.vertices), np.asarray(mesh.faces), **look))
     return found
 
 

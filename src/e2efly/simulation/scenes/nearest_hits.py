@@ -27,7 +27,7 @@ Kinds = tuple[tuple[str, int], ...]
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Sight:
+class TileSight:
     """The data that the loops of n cameras need."""
 
     origin: Float[Array, "n 3"]
@@ -50,7 +50,7 @@ def sight(
     looks: bool,
     sun: Float[Array, "n 3"] | None,
     farthest: float,
-) -> tuple[Sight, Kinds]:
+) -> tuple[TileSight, Kinds]:
     """The solids as cameras see them, without those that are completely beyond a depth.
 
     With a sun, also their shadows.
@@ -83,7 +83,7 @@ def sight(
         hollow = np.array([kind == "gate" for kind, s in each for _ in range(s.count)], bool)
         throwing = _throwing(pattern, matrix, away, reach, height, Vec3.of(sun[:, None]), visible, hollow)
         shading = following(throwing & solids.active[:, None])
-    found = Sight(origin, matrix, scene.ground, following(visible), jnp.stack(forms, axis=1), table, shading)
+    found = TileSight(origin, matrix, scene.ground, following(visible), jnp.stack(forms, axis=1), table, shading)
     return found, kinds
 
 
@@ -118,7 +118,7 @@ class Form:
     matrix: Array
 
     @staticmethod
-    def of(seen: Sight, i: Array) -> "Form":
+    def of(seen: TileSight, i: Array) -> "Form":
         """The solid at a place in the table."""
         row = seen.forms[:, i]
         return Form(row[:ROOM], row[ROOM : ROOM + 3], row[ROOM + 3 :])
@@ -149,7 +149,7 @@ def over(kinds: Kinds, after: Callable[[Array], Array], body: Callable[[str, Arr
     return state
 
 
-def ground(seen: Sight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+def ground(seen: TileSight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
     """Parameter at which rays meet the ground. `FAR`: they do not."""
     speed = turned(seen.matrix.reshape(9), d)[2]
     below = speed < -1e-6
@@ -157,14 +157,14 @@ def ground(seen: Sight, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
     return jnp.where(below, jnp.clip(t, 0.0, FAR), FAR)
 
 
-def entered(kind: str, seen: Sight, i: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+def entered(kind: str, seen: TileSight, i: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
     """Parameter at which rays enter a solid."""
     form = Form.of(seen, i)
     x, y, z = form.origin
     return SHAPES[kind].enter(form.size, (x, y, z), form.direction(d))
 
 
-def depth(seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
+def depth(seen: TileSight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Float[Array, " r"]:
     """Depth of the nearest hits."""
     following = seen.following[tile]
     return over(
@@ -176,7 +176,7 @@ def depth(seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) -> Flo
 
 
 def hits(
-    seen: Sight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"], below: Float[Array, " r"]
+    seen: TileSight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"], below: Float[Array, " r"]
 ) -> tuple[Float[Array, " r"], Float[Array, " r"]]:
     """Depth of the nearest hits, and instance number of what is hit. `below` is the number where no solid is hit."""
     following = seen.following[tile]

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from e2efly.simulation.scenes.nearest_hits import Form, Kinds, Sight, number, over, turned
+from e2efly.simulation.scenes.nearest_hits import Form, Kinds, TileSight, number, over, turned
 from e2efly.simulation.scenes.scene import COLOURS, GROUND, SKY
 from e2efly.simulation.scenes.shapes import FAR, SHAPES, Components
 
@@ -40,7 +40,7 @@ def usual_light(n: int) -> Light:
     return Light(np.tile(sun, (n, 1)), np.full(n, 0.65, np.float32), np.ones(n, np.float32))
 
 
-def squares(seen: Sight, light: Light, d: Float[Array, "3 r"], t: Float[Array, " r"]) -> Float[Array, " r"]:
+def squares(seen: TileSight, light: Light, d: Float[Array, "3 r"], t: Float[Array, " r"]) -> Float[Array, " r"]:
     """The instance on the ground, with `ODD` on every other square, and that of the sky."""
     world = turned(seen.matrix.reshape(9), d)
     scale = jnp.where(light.checker > 0, 1.0 / jnp.where(light.checker > 0, light.checker, 1.0), 0.0)
@@ -52,7 +52,7 @@ def squares(seen: Sight, light: Light, d: Float[Array, "3 r"], t: Float[Array, "
 class Hits:
     """The hits of the rays of one tile of one camera."""
 
-    seen: Sight
+    seen: TileSight
     kinds: Kinds
     tile: Array
     d: Float[Array, "3 r"]

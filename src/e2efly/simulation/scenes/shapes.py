@@ -25,7 +25,7 @@ Interval = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class Shape:
+class SolidShape:
     """One kind of solid. `size` has `ROOM` entries. A shape reads those that `solids.SIZES` names."""
 
     enter: Callable[[Array, Components, Components], Array]
@@ -259,15 +259,17 @@ def _pad_distance(size: Array, p: Array) -> Array:
     return _outside(flat, jnp.abs(p[..., 2]) - size[..., 1])
 
 
-SHAPES: dict[str, Shape] = {
-    "box": Shape(_box_enter, _box_normal, _box_distance, lambda s: _length(s[..., 0], s[..., 1], s[..., 2])),
-    "sphere": Shape(_sphere_enter, _sphere_normal, _sphere_distance, lambda s: s[..., 0]),
-    "cylinder": Shape(_cylinder_enter, _cylinder_normal, _cylinder_distance, lambda s: _length(s[..., 0], s[..., 1])),
-    "capsule": Shape(_capsule_enter, _capsule_normal, _capsule_distance, lambda s: s[..., 0] + s[..., 1]),
-    "gate": Shape(
+SHAPES: dict[str, SolidShape] = {
+    "box": SolidShape(_box_enter, _box_normal, _box_distance, lambda s: _length(s[..., 0], s[..., 1], s[..., 2])),
+    "sphere": SolidShape(_sphere_enter, _sphere_normal, _sphere_distance, lambda s: s[..., 0]),
+    "cylinder": SolidShape(
+        _cylinder_enter, _cylinder_normal, _cylinder_distance, lambda s: _length(s[..., 0], s[..., 1])
+    ),
+    "capsule": SolidShape(_capsule_enter, _capsule_normal, _capsule_distance, lambda s: s[..., 0] + s[..., 1]),
+    "gate": SolidShape(
         _gate_enter, _gate_normal, _gate_distance,
         lambda s: _length(s[..., 0] + s[..., 2], s[..., 1] + s[..., 2], s[..., 3]),
     ),
-    "pad": Shape(_pad_enter, _pad_normal, _pad_distance, lambda s: _length(np.sqrt(2.0) * s[..., 0], s[..., 1])),
+    "pad": SolidShape(_pad_enter, _pad_normal, _pad_distance, lambda s: _length(np.sqrt(2.0) * s[..., 0], s[..., 1])),
 }  # fmt: skip
 """Shapes by name."""

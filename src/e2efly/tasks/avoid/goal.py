@@ -24,7 +24,7 @@ CLIMB = 1.0
 
 
 @dataclass(frozen=True)
-class Memory:
+class AvoidMemory:
     """The commanded speed."""
 
     speed: Array
@@ -42,23 +42,23 @@ class AvoidGoal(Goal):
     """Number of collision checks per control step."""
 
     @classmethod
-    def state(cls, memory: Any) -> Memory:
+    def state(cls, memory: Any) -> AvoidMemory:
         """The state without what only cameras see."""
-        return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
+        return AvoidMemory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(AvoidMemory)})
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: AvoidMemory, time: Array) -> Array:
         """A point behind the end of the forest."""
         del time
         c, zero = self.config, 0.0 * memory.speed
         return namespace(zero).stack([zero + c.forest.length + BEYOND, zero, zero + c.altitude], axis=-1)
 
-    def desired_velocity(self, memory: Memory, time: Array, body: Any) -> Array:
+    def desired_velocity(self, memory: AvoidMemory, time: Array, body: Any) -> Array:
         """(n, 3) velocity, m/s: horizontal to the goal at the commanded speed, vertical to the altitude."""
         xp, away = namespace(body.position), self.goal(memory, time) - body.position
         level = away[:, :2] / xp.linalg.norm(away[:, :2], axis=-1, keepdims=True)
         return xp.concatenate([memory.speed[:, None] * level, xp.clip(away[:, 2:], -CLIMB, CLIMB)], axis=-1)
 
-    def height(self, memory: Memory, time: Array, body: Any) -> Array:
+    def height(self, memory: AvoidMemory, time: Array, body: Any) -> Array:
         """Height of the centre of mass above the ground."""
         del memory, time
         return body.position[:, 2:]
@@ -123,4 +123,4 @@ class AvoidRoute(Route):
         """The course along the lane, with the heading of the lane."""
         config = AvoidConfig()
         goal, start = AvoidGoal(config, shape, control_period, 1), np.array([0.0, 0.0, config.altitude])
-        return Course(goal, Memory(np.array([self.speed])), start, heading=0.0, lowest=config.altitude)
+        return Course(goal, AvoidMemory(np.array([self.speed])), start, heading=0.0, lowest=config.altitude)

@@ -13,7 +13,7 @@ from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.generate import forest
 from e2efly.simulation.scenes.scene import Scene, Solids
-from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, Memory
+from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, AvoidMemory
 from e2efly.tasks.avoid.pilot import best_heading
 from e2efly.tasks.task import at_rest, struck, uniform
 
@@ -23,7 +23,7 @@ STRICT = 1.5
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class World(Memory):
+class AvoidWorld(AvoidMemory):
     """The forest, and the commanded speed."""
 
     trees: Solids
@@ -34,7 +34,7 @@ class World(Memory):
 class Avoid(AvoidGoal):
     """Starts in front of a random forest."""
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, AvoidWorld]:
         """At rest in front of the forest, facing it."""
         trees_key, state_key = jax.random.split(key)
         c, u, zero = self.config, uniform(state_key, n, 5), jnp.zeros(n)
@@ -43,10 +43,10 @@ class Avoid(AvoidGoal):
         speed = (low + high) / 2 + (high - low) / 2 * u[:, 2]
         end = jnp.stack([zero + c.forest.length, zero, zero], axis=-1)
         trees = forest(trees_key, n, c.forest, state.position, end)
-        return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), World(speed, trees)
+        return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), AvoidWorld(speed, trees)
 
     def expert(
-        self, memory: World, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
+        self, memory: AvoidWorld, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
     ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
         """Velocity, m/s, and yaw, rad, of an expert that knows every tree.
 
@@ -62,18 +62,18 @@ class Avoid(AvoidGoal):
         climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
         return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
 
-    def scene(self, memory: World) -> Scene:
+    def scene(self, memory: AvoidWorld) -> Scene:
         """The trees on level ground."""
         return Scene.of({"cylinder": memory.trees}, memory.speed.shape[0])
 
-    def desired_yaw(self, memory: World, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: AvoidWorld, state: State) -> Float[Array, " n"]:
         """Towards the goal."""
         away = self.goal(memory, memory.speed) - state.position
         return jnp.arctan2(away[:, 1], away[:, 0])
 
     def advance(
-        self, memory: World, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[World, Outcome]:
+        self, memory: AvoidWorld, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[AvoidWorld, Outcome]:
         """The goal's verdict, with signals for the reward."""
         del timed_out
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)

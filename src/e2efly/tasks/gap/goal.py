@@ -29,7 +29,7 @@ RIM = 8
 
 
 @dataclass(frozen=True)
-class Memory:
+class GapMemory:
     """The slit of each vehicle, and whether the vehicle has passed it."""
 
     centre: Array
@@ -53,28 +53,28 @@ class GapGoal(Goal):
     checks: int
     """Number of collision checks per control step."""
 
-    def targets(self, memory: Memory) -> Array:
+    def targets(self, memory: GapMemory) -> Array:
         """(n, 2, 3) the middle of the slit and the point behind it, world, m."""
         through = self.axes(memory)[:, 0]
         return namespace(through).stack([memory.centre, memory.centre + self.config.beyond * through], axis=1)
 
-    def axes(self, memory: Memory) -> Array:
+    def axes(self, memory: GapMemory) -> Array:
         """(n, 2, 3) unit vectors, world: the direction of flight through the slit, and that of its short side."""
         xp = namespace(memory.centre)
         return rotate(memory.quaternion[:, None], xp.asarray(np.eye(3, dtype=np.float32)[[0, 2]]))
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: GapMemory, time: Array) -> Array:
         """The middle of the slit; once it is passed, the point behind it."""
         del time
         both = self.targets(memory)
         return namespace(both).where(memory.passed[:, None], both[:, 1], both[:, 0])
 
-    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+    def target_offsets(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both targets minus position."""
         del time
         return offsets(self.targets(memory), body)
 
-    def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
+    def flat_axes(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both axes as one vector."""
         del time
         return self.axes(memory).reshape(body.position.shape[0], 6)
@@ -90,7 +90,7 @@ class GapGoal(Goal):
         ),
     )
 
-    def touched(self, memory: Memory, before: Any, after: Any) -> Array:
+    def touched(self, memory: GapMemory, before: Any, after: Any) -> Array:
         """(n,) whether one of the points on the body's two rims was in the wall or the ground during the step.
 
         Each point is checked `checks` times, on the cubic through its positions and velocities at both ends of the
@@ -115,7 +115,9 @@ class GapGoal(Goal):
         inside = (local[..., 0] < self.config.thickness / 2) & across.all(-1) & ~opened.all(-1)
         return (inside | (path[..., 2] < 0)).any((0, 2))
 
-    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+    def advance(
+        self, memory: GapMemory, before: Any, after: Any, time: Array, timed_out: Array
+    ) -> tuple[GapMemory, Outcome]:
         """Judge a step. Success: through the slit to the point behind it, without touching anything.
 
         The slit is passed in a step whose straight line crosses the wall's middle plane forward inside the opening.
@@ -150,7 +152,7 @@ class GapGoal(Goal):
         del mean_error, final_error
         return f"through after {arrivals[0]:.2f} s, then {speed:.1f} m/s" if arrivals else "not through"
 
-    def failure(self, memory: Memory, outcome: Outcome) -> str:
+    def failure(self, memory: GapMemory, outcome: Outcome) -> str:
         """Whether the slit was missed or the wall was touched, as text."""
         if outcome.signals["missed"][0]:
             return "the slit was missed"
@@ -189,7 +191,7 @@ class GapRoute(Route):
         """The course from a point straight in front of the slit to the point behind it, flown once."""
         goal = GapGoal(GapConfig(), shape, control_period, checks=4)
         turn = Quat.of_euler(np.array([self.slit_roll]), np.zeros(1), np.array([self.slit_yaw])).stack()
-        memory = Memory(np.array([self.slit]), turn, np.zeros(1, bool))
+        memory = GapMemory(np.array([self.slit]), turn, np.zeros(1, bool))
         start = np.asarray(self.slit) - self.before * turned(self.slit_yaw)
         lowest = self.slit[2] - goal.config.opening[0] / 2
         return Course(goal, memory, start, heading=self.slit_yaw, lowest=lowest, clearance=0.0)

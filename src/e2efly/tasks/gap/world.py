@@ -15,14 +15,14 @@ from e2efly.simulation.physics.rotation import from_euler, rotate, unrotate
 from e2efly.simulation.scenes.scene import WALL, Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.gap import GapConfig
-from e2efly.tasks.gap.goal import WALL_WIDTH, GapGoal, Memory, rims
+from e2efly.tasks.gap.goal import WALL_WIDTH, GapGoal, GapMemory, rims
 from e2efly.tasks.task import at_rest, uniform
 
 START_YAW = 0.3
 """Largest heading angle at the start, to either side, rad."""
 PASSING = 0.2
 """Distance from the wall's middle plane within which a vehicle must be inside the opening, m."""
-jax.tree_util.register_dataclass(Memory)
+jax.tree_util.register_dataclass(GapMemory)
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
@@ -54,30 +54,30 @@ class Gap(GapGoal):
             )
         return Gap(config, shape, control_period, checks)
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, GapMemory]:
         """At rest in front of the wall, roughly facing it. The slit is anywhere ahead, tilted to the left or right."""
         c, u, zero = self.config, uniform(key, n, 7), jnp.zeros(n)
         state = at_rest(jnp.stack([zero, zero, zero + c.altitude], axis=-1))
         ahead = _within(c.distance, u[:, 0])
         centre = jnp.stack([ahead, c.sideways * u[:, 1], c.altitude + c.sideways * u[:, 2]], axis=-1)
         roll = jnp.where(u[:, 3] < 0, -1.0, 1.0) * _within(c.roll, u[:, 4])
-        memory = Memory(centre, from_euler(roll, zero, c.yaw * u[:, 5]), jnp.zeros(n, bool))
+        memory = GapMemory(centre, from_euler(roll, zero, c.yaw * u[:, 5]), jnp.zeros(n, bool))
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, START_YAW * u[:, 6])), memory
 
-    def scene(self, memory: Memory) -> Scene:
+    def scene(self, memory: GapMemory) -> Scene:
         """The wall over level ground: a gate with bars so wide that they form a wall."""
         c, n = self.config, memory.centre.shape[0]
         size = jnp.stack([jnp.asarray(x) for x in (c.opening[0] / 2, c.opening[1] / 2, WALL_WIDTH, c.thickness / 2)])
         wall = Solids.of("gate", memory.centre[:, None], size, label=WALL)
         return Scene.of({"gate": dataclasses.replace(wall, quaternion=memory.quaternion[:, None])}, n)
 
-    def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: GapMemory, state: State) -> Float[Array, " n"]:
         """The heading straight through the wall."""
         del state
         through = self.axes(memory)[:, 0]
         return jnp.arctan2(through[:, 1], through[:, 0])
 
-    def roll_error(self, memory: Memory, state: State) -> Float[Array, " n"]:
+    def roll_error(self, memory: GapMemory, state: State) -> Float[Array, " n"]:
         """Rotation about the direction of flight that would align the vehicle with the slit, rad.
 
         It is 0 if the vehicle's z axis lies along this direction.
@@ -87,7 +87,7 @@ class Gap(GapGoal):
         defined = up[:, 1] ** 2 + up[:, 2] ** 2 > 1e-12
         return jnp.arctan2(jnp.where(defined, -up[:, 1], 0.0), jnp.where(defined, up[:, 2], 1.0))
 
-    def overhang(self, memory: Memory, state: State) -> Float[Array, "n p"]:
+    def overhang(self, memory: GapMemory, state: State) -> Float[Array, "n p"]:
         """Distance by which each point of the body lies outside the opening, m.
 
         It is negative inside the opening, and `-FAR` away from the wall.
@@ -100,8 +100,8 @@ class Gap(GapGoal):
         return jnp.where(jnp.abs(local[..., 0]) < PASSING, out, -FAR)
 
     def advance(
-        self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[Memory, Outcome]:
+        self, memory: GapMemory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[GapMemory, Outcome]:
         """The goal's verdict, with signals for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         signals = {"roll_error": self.roll_error(memory, after), "overhang": self.overhang(memory, after)}

@@ -26,7 +26,7 @@ NEAREST = 1e-3
 
 
 @dataclass(frozen=True)
-class Memory:
+class HoverAwareMemory:
     """The object to look at, a ball on a circle, and the time for which both conditions of success have held."""
 
     centre: Array
@@ -55,23 +55,23 @@ class HoverAwareGoal(Goal):
     shape: Shape
     control_period: float | Array
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: HoverAwareMemory, time: Array) -> Array:
         """The point to hover at."""
         del time
         xp = namespace(memory.held)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.held.shape, 3))
 
-    def look_at(self, memory: Memory, time: Array) -> Array:
+    def look_at(self, memory: HoverAwareMemory, time: Array) -> Array:
         """(n, 3) position of the object to look at, world, m."""
         xp, angle = namespace(memory.away), memory.angle + memory.rate * time
         circle = xp.stack([memory.away * xp.cos(angle), memory.away * xp.sin(angle), 0.0 * angle], axis=-1)
         return memory.centre + circle
 
-    def position_error(self, memory: Memory, time: Array, body: Any) -> Array:
+    def position_error(self, memory: HoverAwareMemory, time: Array, body: Any) -> Array:
         """The point to hover at minus position."""
         return self.goal(memory, time) - body.position
 
-    def look_at_offset(self, memory: Memory, time: Array, body: Any) -> Array:
+    def look_at_offset(self, memory: HoverAwareMemory, time: Array, body: Any) -> Array:
         """Position of the object to look at minus position."""
         return self.look_at(memory, time) - body.position
 
@@ -102,7 +102,9 @@ class HoverAwareGoal(Goal):
         inside = xp.clip(-seen[:, 1:] / edge / xp.where(front, ahead, 1.0), -OUTSIDE, OUTSIDE)
         return xp.where(front, inside, OUTSIDE)
 
-    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+    def advance(
+        self, memory: HoverAwareMemory, before: Any, after: Any, time: Array, timed_out: Array
+    ) -> tuple[HoverAwareMemory, Outcome]:
         """Judge a step. Success: within the radius and with the object centred for the last `hold_s` of the episode.
 
         Leaving the fence, or touching the ground or the object, fails.
@@ -146,7 +148,7 @@ class HoverAwareRoute(Route):
         """The course to the target. It has no end."""
         x, y, z = np.subtract(self.look_at, self.target)
         config = dataclasses.replace(HoverAwareConfig(), target=self.target, size=self.size)
-        memory = Memory(
+        memory = HoverAwareMemory(
             centre=np.array([[*self.target[:2], self.target[2] + z]]), away=np.array([math.hypot(x, y)]),
             angle=np.array([math.atan2(y, x)]), rate=np.array([self.turn_rate]), time=np.zeros(1), held=np.zeros(1),
         )  # fmt: skip

@@ -13,10 +13,10 @@ from e2efly.policy.goal import Outcome
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene, Solids
-from e2efly.tasks.hover_aware.goal import HoverAwareGoal, Memory
+from e2efly.tasks.hover_aware.goal import HoverAwareGoal, HoverAwareMemory
 from e2efly.tasks.task import at_rest, uniform
 
-jax.tree_util.register_dataclass(Memory)
+jax.tree_util.register_dataclass(HoverAwareMemory)
 
 
 @jax.tree_util.register_dataclass
@@ -27,7 +27,7 @@ class HoverAware(HoverAwareGoal):
     page: ClassVar = "hover_aware"
     """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, HoverAwareMemory]:
         """Uniform around the target: position, velocity, roll, pitch, any yaw.
 
         The object is somewhere around the target.
@@ -39,10 +39,10 @@ class HoverAware(HoverAwareGoal):
         low, high = c.distance
         away, angle = (low + high) / 2 + (high - low) / 2 * u[:, 9], jnp.pi * u[:, 10]
         centre = target + jnp.stack([zero, zero, c.elevation * u[:, 11]], axis=-1)
-        memory = Memory(centre, away, angle, c.turn_rate * u[:, 12], zero, zero)
+        memory = HoverAwareMemory(centre, away, angle, c.turn_rate * u[:, 12], zero, zero)
         return dataclasses.replace(state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion), memory
 
-    def scene(self, memory: Memory) -> Scene:
+    def scene(self, memory: HoverAwareMemory) -> Scene:
         """The ball over level ground."""
         x, y, zero = memory.away * jnp.cos(memory.angle), memory.away * jnp.sin(memory.angle), 0.0 * memory.away
         ball = dataclasses.replace(
@@ -53,13 +53,13 @@ class HoverAware(HoverAwareGoal):
         )
         return Scene.of({"sphere": ball}, memory.held.shape[0])
 
-    def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: HoverAwareMemory, state: State) -> Float[Array, " n"]:
         """Towards the position of the object at the end of the last step."""
         away = self.look_at(memory, memory.time) - state.position
         return jnp.arctan2(away[:, 1], away[:, 0] + 1e-6)
 
     def projection(
-        self, memory: Memory, state: State, time: Float[Array, " n"]
+        self, memory: HoverAwareMemory, state: State, time: Float[Array, " n"]
     ) -> tuple[Float[Array, "n 2"], Float[Array, "n 2"]]:
         """Pixel of the object, and its velocity, 1/s, from the motion of the vehicle and of the object."""
 
@@ -70,8 +70,13 @@ class HoverAware(HoverAwareGoal):
         return jax.jvp(seen, (state.position, state.quaternion, time), (state.velocity, turning, jnp.ones_like(time)))
 
     def advance(
-        self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[Memory, Outcome]:
+        self,
+        memory: HoverAwareMemory,
+        before: State,
+        after: State,
+        time: Float[Array, " n"],
+        timed_out: Bool[Array, " n"],
+    ) -> tuple[HoverAwareMemory, Outcome]:
         """The goal's verdict, with the pixel's velocity for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         pixel, velocity = self.projection(memory, after, time)

@@ -20,7 +20,7 @@ HIGHEST = 3.0
 
 
 @dataclass(frozen=True)
-class Memory:
+class AnyRaceMemory:
     """The track of each vehicle, and the number of gates that it has passed."""
 
     tracks: Tracks
@@ -48,7 +48,7 @@ class Ahead:
     """(n, s, 2) half of the width and height of the openings, m."""
 
     @staticmethod
-    def of(memory: Memory) -> "Ahead":
+    def of(memory: AnyRaceMemory) -> "Ahead":
         """The gates that follow the gates passed."""
         tracks, index = memory.tracks, memory.index
         g, xp = tracks.gates, namespace(memory.passed)
@@ -69,31 +69,31 @@ class AnyRaceGoal(Racing):
     config: RaceConfig
     shape: Shape
 
-    def place(self, memory: Memory) -> tuple[int, int]:
+    def place(self, memory: AnyRaceMemory) -> tuple[int, int]:
         """See `Racing.place`."""
         return int(memory.index[0]) + 1, int(memory.passed[0] // memory.tracks.count[0]) + 1
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: AnyRaceMemory, time: Array) -> Array:
         """The next gate's centre."""
         del time
         return Ahead.of(memory).centre[:, 0]
 
-    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+    def target_offsets(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The centres of the next gates minus position."""
         del time
         return offsets(Ahead.of(memory).centre, body)
 
-    def axes(self, memory: Memory, time: Array, body: Any) -> Array:
+    def axes(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The directions of the next gates."""
         del time
         return Ahead.of(memory).axis.reshape(body.position.shape[0], -1)
 
-    def openings(self, memory: Memory, time: Array, body: Any) -> Array:
+    def openings(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """Width and height of the next gates."""
         del time
         return 2 * Ahead.of(memory).half.reshape(body.position.shape[0], -1)
 
-    def height(self, memory: Memory, time: Array, body: Any) -> Array:
+    def height(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """Height above the ground, limited to `HIGHEST`."""
         del memory, time
         return namespace(body.position).clip(body.position[:, 2:], 0.0, HIGHEST)
@@ -117,7 +117,7 @@ class AnyRaceGoal(Racing):
         (Field("height", 1, "none", "m", 2.0, "height over the ground, 3 where it is more"), height),
     )  # fmt: skip
 
-    def fence(self, memory: Memory) -> Array:
+    def fence(self, memory: AnyRaceMemory) -> Array:
         """(n,) largest allowed distance from the next gate, m.
 
         It is the fence plus the distance between the last gate, or the start, and the next gate.
@@ -128,7 +128,9 @@ class AnyRaceGoal(Racing):
         here = xp.where(memory.passed[:, None] == 0, g.start, here)
         return self.config.fence + distance(here, there)
 
-    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+    def advance(
+        self, memory: AnyRaceMemory, before: Any, after: Any, time: Array, timed_out: Array
+    ) -> tuple[AnyRaceMemory, Outcome]:
         """Judge a step. Success: the last gate of the last lap is passed.
 
         Crossings are judged on the straight line of the step.
@@ -140,7 +142,7 @@ class AnyRaceGoal(Racing):
         passed, outcome = self.verdict(memory, before, after, tracks.gates, memory.index, end, self.fence(memory))
         return dataclasses.replace(memory, passed=memory.passed + passed), outcome
 
-    def drawn(self, memory: Memory) -> dict[str, Array]:
+    def drawn(self, memory: AnyRaceMemory) -> dict[str, Array]:
         """The track: its start, its gates (rows beyond `count` are unused), and whether it is closed."""
         t = memory.tracks
         yaw = namespace(memory.passed).arctan2(t.gates.sin, t.gates.cos)

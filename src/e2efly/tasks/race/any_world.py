@@ -18,14 +18,14 @@ from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.race import ANY, RaceConfig
-from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, Memory
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
 
 LOWEST_START = 0.3
 """Smallest height of the feet above the ground in a start, m."""
 
-jax.tree_util.register_dataclass(Memory, data_fields=["tracks", "passed"], meta_fields=[])
+jax.tree_util.register_dataclass(AnyRaceMemory, data_fields=["tracks", "passed"], meta_fields=[])
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])
@@ -51,7 +51,7 @@ class AnyRace(AnyRaceGoal):
         numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
         return AnyRace(numbers, shape, None if given is None else Tracks.of(given, MOST))
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, AnyRaceMemory]:
         """At rest and level in a ball around the start of each vehicle's track, with the heading of the track."""
         track_key, state_key = jax.random.split(key)
         if self.given is None:
@@ -62,21 +62,21 @@ class AnyRace(AnyRaceGoal):
             tracks = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x), (n, *x.shape[1:])), self.given)
         g = tracks.gates
         state = begun(state_key, n, self.config.position, self.shape, g.start, g.start_yaw)
-        return state, Memory(tracks, jnp.zeros(n, jnp.int32))
+        return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32))
 
-    def scene(self, memory: Memory) -> Scene:
+    def scene(self, memory: AnyRaceMemory) -> Scene:
         """The gates over level ground."""
         n, tracks = memory.passed.shape[0], memory.tracks
         return Scene.of({"gate": frames(tracks.gates, n, active=tracks.there)}, n)
 
-    def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: AnyRaceMemory, state: State) -> Float[Array, " n"]:
         """Towards the next gate."""
         d = self.goal(memory, memory.passed) - state.position
         return jnp.arctan2(d[:, 1], d[:, 0] + 1e-6)
 
     def advance(
-        self, memory: Memory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[Memory, Outcome]:
+        self, memory: AnyRaceMemory, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[AnyRaceMemory, Outcome]:
         """The goal's verdict, with signals for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         ahead = Ahead.of(memory)

@@ -19,7 +19,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
-from e2efly.tasks.race.any_goal import AnyRaceGoal, Memory
+from e2efly.tasks.race.any_goal import AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import offsets
@@ -122,7 +122,9 @@ class RaceRoute(Route):
         if "gate_axes" not in (field.name for field in contract.observation):
             return super().course_of(contract, shape)
         track = self._track()
-        return self._placed(AnyRaceGoal(self._options(), shape), Memory(Tracks.of(track), np.zeros(1, int)), track)
+        return self._placed(
+            AnyRaceGoal(self._options(), shape), AnyRaceMemory(Tracks.of(track), np.zeros(1, int)), track
+        )
 
     def domain(self) -> Domain:
         """The track."""

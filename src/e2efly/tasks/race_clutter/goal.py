@@ -26,7 +26,7 @@ from e2efly.tasks.verdicts import distance, offsets
 
 
 @dataclass(frozen=True)
-class Memory(any_goal.Memory):
+class ClutterMemory(any_goal.AnyRaceMemory):
     """The track of each vehicle, the number of gates that it has passed, and its commanded speed."""
 
     speed: Array
@@ -44,26 +44,26 @@ class RaceClutterGoal(Goal):
     """Number of collision checks per control step."""
 
     @classmethod
-    def state(cls, memory: Any) -> Memory:
+    def state(cls, memory: Any) -> ClutterMemory:
         """The state without what only cameras see."""
-        return Memory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(Memory)})
+        return ClutterMemory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(ClutterMemory)})
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: ClutterMemory, time: Array) -> Array:
         """The next gate's centre."""
         del time
         return Ahead.of(memory).centre[:, 0]
 
-    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+    def target_offsets(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The centres of the next two gates minus position."""
         del time
         return offsets(Ahead.of(memory).centre[:, :2], body)
 
-    def flat_axes(self, memory: Memory, time: Array, body: Any) -> Array:
+    def flat_axes(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The directions of flight through the next two gates."""
         del time
         return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
-    def desired_speed(self, memory: Memory, time: Array, body: Any) -> Array:
+    def desired_speed(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The commanded speed."""
         del time, body
         return memory.speed[:, None]
@@ -108,7 +108,7 @@ class RaceClutterGoal(Goal):
         del mean_error, final_error, speed
         return f"{len(arrivals)} gates in {arrivals[-1]:.2f} s" if arrivals else "no gate"
 
-    def failure(self, memory: Memory, outcome: Outcome) -> str:
+    def failure(self, memory: ClutterMemory, outcome: Outcome) -> str:
         """The gate that was missed, if this is the reason."""
         where = f"gate {int(memory.index[0]) + 1} of lap {int(memory.passed[0] // memory.tracks.count[0]) + 1}"
         return f"{where} missed" if outcome.signals["missed"][0] else f"{super().failure(memory, outcome)}, {where}"
@@ -133,7 +133,7 @@ class RaceClutterRoute(Route):
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "RaceClutterRoute":
         """The route with the gates that were drawn, written to a file, and with the speed that was drawn."""
-        memory: Memory = course.memory
+        memory: ClutterMemory = course.memory
         file.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(file, track_text(memory.tracks.track(0)).encode())
         return cls(track=str(file), scale=1.0, laps=int(course.goal.config.laps), speed=float(memory.speed[0]))
@@ -146,7 +146,7 @@ class RaceClutterRoute(Route):
         """The course along the track, from its start and with its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
         track = load_track(self.track).enlarged(self.scale)
-        memory = Memory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
+        memory = ClutterMemory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
         lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         return Course(
             RaceClutterGoal(config, shape, control_period, 1), memory,

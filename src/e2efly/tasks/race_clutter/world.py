@@ -21,7 +21,7 @@ from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.race.any_goal import Ahead
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import Memory, RaceClutterGoal
+from e2efly.tasks.race_clutter.goal import ClutterMemory, RaceClutterGoal
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
@@ -36,7 +36,7 @@ LOOKING = 5.0
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class World(Memory):
+class ClutterWorld(ClutterMemory):
     """The world of each vehicle, and the number of gates that it has passed."""
 
     obstacles: dict[str, Solids]
@@ -78,7 +78,7 @@ class RaceClutter(RaceClutterGoal):
         numbers = dataclasses.replace(config, track=("",) * len(tracks))
         return RaceClutter(numbers, shape, control_period, checks, given)
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, World]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, ClutterWorld]:
         """At rest in a ball around the start of a track. Every world is different."""
         gate_key, clutter_key, state_key = jax.random.split(key, 3)
         c, u = self.config, uniform(state_key, n, 4)
@@ -97,7 +97,7 @@ class RaceClutter(RaceClutterGoal):
         obstacles = clutter(clutter_key, n, c.clutter, path, keep, largest, legs)
         low, high = c.speed
         speed = (low + high) / 2 + (high - low) / 2 * u[:, 3]
-        memory = World(tracks, jnp.zeros(n, jnp.int32), speed, obstacles)
+        memory = ClutterWorld(tracks, jnp.zeros(n, jnp.int32), speed, obstacles)
         return dataclasses.replace(state, quaternion=quaternion), memory
 
     def _drawn(self, key: PRNGKeyArray, n: int) -> Tracks:
@@ -119,7 +119,7 @@ class RaceClutter(RaceClutterGoal):
         )
         return dataclasses.replace(tracks, gates=moved)
 
-    def desired_velocity(self, memory: World, state: State) -> Float[Array, "n 3"]:
+    def desired_velocity(self, memory: ClutterWorld, state: State) -> Float[Array, "n 3"]:
         """Velocity at the commanded speed towards a point close behind the next gate.
 
         In the middle of the gate it still points straight through.
@@ -129,13 +129,13 @@ class RaceClutter(RaceClutterGoal):
         away = behind - state.position
         return memory.speed[:, None] * away / (jnp.linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
-    def scene(self, memory: World) -> Scene:
+    def scene(self, memory: ClutterWorld) -> Scene:
         """Gates and obstacles over level ground."""
         n = memory.speed.shape[0]
         gates = frames(memory.tracks.gates, n, active=memory.tracks.there)
         return Scene.of({**memory.obstacles, "gate": gates}, n)
 
-    def overhang(self, memory: World, state: State) -> Float[Array, "n 1"]:
+    def overhang(self, memory: ClutterWorld, state: State) -> Float[Array, "n 1"]:
         """How far the vehicle's sphere extends outside the next gate's opening, m. `-FAR` far from the gate's plane."""
         ahead = Ahead.of(memory)
         axis, half = ahead.axis[:, 0], ahead.half[:, 0]
@@ -145,7 +145,7 @@ class RaceClutter(RaceClutterGoal):
         out = jnp.maximum(jnp.abs(beside) - half[:, 0], jnp.abs(d[:, 2]) - half[:, 1]) + self.shape.radius
         return jnp.where(jnp.abs(away) < PASSING, out, -FAR)[:, None]
 
-    def desired_yaw(self, memory: World, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: ClutterWorld, state: State) -> Float[Array, " n"]:
         """Heading towards the point `LOOKING` ahead on the way through the next two gates.
 
         Near a gate this point lies on the leg behind it.
@@ -157,8 +157,8 @@ class RaceClutter(RaceClutterGoal):
         return jax.lax.stop_gradient(jnp.arctan2(d[:, 1], d[:, 0] + 1e-6))
 
     def advance(
-        self, memory: World, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
-    ) -> tuple[World, Outcome]:
+        self, memory: ClutterWorld, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+    ) -> tuple[ClutterWorld, Outcome]:
         """The goal's verdict, with signals for the reward."""
         del timed_out
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)

@@ -42,7 +42,7 @@ _MOTION = [
 
 
 @dataclass(frozen=True)
-class Memory:
+class TrackMemory:
     """The reference, and the error summed over the counted steps."""
 
     reference: Spline
@@ -59,15 +59,15 @@ class TrackGoal(Goal):
     config: TrackConfig
     shape: Shape
 
-    def goal(self, memory: Memory, time: Array) -> Array:
+    def goal(self, memory: TrackMemory, time: Array) -> Array:
         """The reference point for now."""
         return memory.reference.position(time[:, None])[:, 0]
 
-    def targets(self, memory: Memory, time: Array) -> Array:
+    def targets(self, memory: TrackMemory, time: Array) -> Array:
         """(n, k, 3) the reference points for now and for the next second, world, m."""
         return memory.reference.position(time[:, None] + SPACING * np.arange(POINTS, dtype=np.float32))
 
-    def target_offsets(self, memory: Memory, time: Array, body: Any) -> Array:
+    def target_offsets(self, memory: TrackMemory, time: Array, body: Any) -> Array:
         """The same points minus position."""
         return offsets(self.targets(memory, time), body)
 
@@ -90,7 +90,9 @@ class TrackGoal(Goal):
         position, velocity, acceleration, jerk = map(Vec3.of, moves)
         return Place(position, velocity, acceleration, jerk)
 
-    def advance(self, memory: Memory, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Memory, Outcome]:
+    def advance(
+        self, memory: TrackMemory, before: Any, after: Any, time: Array, timed_out: Array
+    ) -> tuple[TrackMemory, Outcome]:
         """Judge a step. Success: a small mean error since `settle_s` at the end of the episode.
 
         Leaving the fence or touching the ground fails.
@@ -99,7 +101,7 @@ class TrackGoal(Goal):
         c = self.config
         error = distance(after.position, self.goal(memory, time))
         counts = (time > c.settle_s).astype(error.dtype)
-        memory = Memory(memory.reference, memory.error_sum + counts * error, memory.steps + counts)
+        memory = TrackMemory(memory.reference, memory.error_sum + counts * error, memory.steps + counts)
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         mean = memory.error_sum / memory.steps.clip(1.0)
         success = timed_out & ~crashed & (mean < c.mean_error)
@@ -143,7 +145,7 @@ class TrackRoute(Route):
         del control_period
         spline = self._spline()
         start = np.array(spline.position(np.zeros((1, 1)))[0, 0], np.float64)
-        memory = Memory(spline, np.zeros(1), np.zeros(1))
+        memory = TrackMemory(spline, np.zeros(1), np.zeros(1))
         lowest = float(spline.knots[0, :, 0, 2].min())
         return Course(TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, lowest=lowest)
 

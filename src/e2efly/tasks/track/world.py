@@ -18,10 +18,10 @@ from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.task import at_rest, into_ball, uniform
 from e2efly.tasks.track import TrackConfig
-from e2efly.tasks.track.goal import Memory, TrackGoal
+from e2efly.tasks.track.goal import TrackGoal, TrackMemory
 from e2efly.tasks.track.splines import polynomial
 
-jax.tree_util.register_dataclass(Memory)
+jax.tree_util.register_dataclass(TrackMemory)
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "curve"], meta_fields=["knots"])
@@ -73,7 +73,7 @@ class Track(TrackGoal):
         knots = jnp.asarray(self.curve.knots)
         return dataclasses.replace(self.curve, knots=jnp.broadcast_to(knots, (n, *knots.shape[1:])))
 
-    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Memory]:
+    def start(self, key: PRNGKeyArray, n: int) -> tuple[State, TrackMemory]:
         """Level, any heading, near the first point of the reference, with a random velocity."""
         c = self.config
         reference_key, state_key = jax.random.split(key)
@@ -85,19 +85,19 @@ class Track(TrackGoal):
             velocity=c.velocity * u[:, 3:6],
             quaternion=from_euler(zero, zero, jnp.pi * u[:, 6]),
         )
-        return state, Memory(reference, zero, zero)
+        return state, TrackMemory(reference, zero, zero)
 
-    def drawn(self, memory: Memory) -> dict[str, Array]:
+    def drawn(self, memory: TrackMemory) -> dict[str, Array]:
         """The phase of a circle or a lemniscate; the knots of a random polynomial."""
         if isinstance(self.curve, Lissajous):
             return {"phase_rad": self.curve.phase(self.config.centre, memory.reference.knots[:, 0])}
         return {"knots": memory.reference.knots} if self.curve is None else {}
 
-    def scene(self, memory: Memory) -> Scene:
+    def scene(self, memory: TrackMemory) -> Scene:
         """Level ground."""
         return Scene.of({}, memory.steps.shape[0])
 
-    def desired_yaw(self, memory: Memory, state: State) -> Float[Array, " n"]:
+    def desired_yaw(self, memory: TrackMemory, state: State) -> Float[Array, " n"]:
         """Along world x."""
         del state
         return jnp.zeros_like(memory.steps)

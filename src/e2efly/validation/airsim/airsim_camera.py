@@ -18,7 +18,7 @@ from e2efly.validation.airsim.airsim_images import (
     Picture,
     fields_of_view,
 )
-from e2efly.validation.airsim.lockstep import Session
+from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.plant import RigidState
 
 IMAGE_TYPES = {"depth": DEPTH_PLANAR, "range": DEPTH_PERSPECTIVE, "rgb": SCENE, "mask": SEGMENTATION}
@@ -37,7 +37,7 @@ FORM = "plant:CAMERA, for a mask plant:CAMERA:RED,GREEN,BLUE"
 
 
 @dataclass(frozen=True)
-class Mount:
+class AirSimMount:
     """How a camera is mounted on its vehicle."""
 
     place: np.ndarray
@@ -45,14 +45,14 @@ class Mount:
     turn: np.ndarray
     """(4,) unit, wxyz: rotation from the camera's axes forward, left, up to those of the vehicle."""
 
-    def off(self, other: "Mount") -> tuple[float, float]:
+    def off(self, other: "AirSimMount") -> tuple[float, float]:
         """Distance, m, and angle, rad, to another mount."""
         cosine = abs(float(self.turn @ other.turn))
         return float(np.linalg.norm(self.place - other.place)), 2 * math.acos(min(cosine, 1.0))
 
 
 @dataclass(frozen=True)
-class Camera:
+class AirSimCamera:
     """One camera for one image of a contract."""
 
     name: str
@@ -65,7 +65,7 @@ class Camera:
     """Field of view of the longer side, degrees."""
     size: tuple[int, int] = (0, 0)
     """Columns and rows of its pictures."""
-    mount: Mount | None = None
+    mount: AirSimMount | None = None
     """The measured mount."""
 
     @property
@@ -83,7 +83,7 @@ class Camera:
         )
 
 
-def camera_of(where: str, image: Image) -> Camera:
+def camera_of(where: str, image: Image) -> AirSimCamera:
     """The camera that a text names, before AirSim is asked for it.
 
     Args:
@@ -107,10 +107,10 @@ def camera_of(where: str, image: Image) -> Camera:
     colour = tuple(int(part) for part in text.split(",") if part.isascii() and part.isdigit())
     if colon and not (len(colour) == 3 == len(text.split(",")) and max(colour) <= 255):
         raise ValueError(f"{given}; accepted: {FORM}, each 0 to 255")
-    return Camera(name, image, colour)
+    return AirSimCamera(name, image, colour)
 
 
-def opened(session: Session, camera: Camera) -> Camera:
+def opened(session: AirSimSession, camera: AirSimCamera) -> AirSimCamera:
     """The camera with AirSim's data, after one picture of the standing vehicle.
 
     Raises:
@@ -134,7 +134,7 @@ def opened(session: Session, camera: Camera) -> Camera:
     return whole
 
 
-def taken(session: Session, camera: Camera) -> np.ndarray:
+def taken(session: AirSimSession, camera: AirSimCamera) -> np.ndarray:
     """The present image of the policy's camera: (h, w) or (h, w, 3) float32, as `Image.check` accepts it.
 
     AirSim updates what it draws once per frame of its game, and never during a pause. A picture may therefore show an
@@ -147,7 +147,7 @@ def taken(session: Session, camera: Camera) -> np.ndarray:
     return _fitted(_picture(session, camera)[0], camera, _where(session, camera))
 
 
-def _fitted(seen: Picture, camera: Camera, where: str) -> np.ndarray:
+def _fitted(seen: Picture, camera: AirSimCamera, where: str) -> np.ndarray:
     """A picture as the policy's camera would have taken it."""
     height, width = seen.image.shape[:2]
     if (width, height) != camera.size:
@@ -165,13 +165,13 @@ def _fitted(seen: Picture, camera: Camera, where: str) -> np.ndarray:
     return image
 
 
-def _picture(session: Session, camera: Camera) -> tuple[Picture, Mount]:
+def _picture(session: AirSimSession, camera: AirSimCamera) -> tuple[Picture, AirSimMount]:
     """A picture from the camera's present place.
 
     Until its mount is known, this is the place that the contract gives.
     """
     image, half = camera.image, camera.image.pitch_rad / 2
-    meant = Mount(np.array(image.position_m), np.array([math.cos(half), 0.0, math.sin(half), 0.0]))
+    meant = AirSimMount(np.array(image.position_m), np.array([math.cos(half), 0.0, math.sin(half), 0.0]))
     off = ""
     for _ in range(_TRIES):
         state, seen = session.state(), session.picture(camera.name, camera.kind)
@@ -191,19 +191,19 @@ def _picture(session: Session, camera: Camera) -> tuple[Picture, Mount]:
     raise ValueError(f"{_where(session, camera)}: {off}")
 
 
-def _mount(seen: Picture, state: RigidState) -> Mount:
+def _mount(seen: Picture, state: RigidState) -> AirSimMount:
     """The camera's mount, from one of its pictures and the vehicle's state."""
     attitude = Quat.of(state.quaternion)
     away = attitude.unrotate(Vec3.of(seen.position - state.position))
     turn = attitude.conjugate().compose(Quat.of(seen.quaternion))
-    return Mount(np.array([away.x, away.y, away.z], float), np.array(turn.stack()))
+    return AirSimMount(np.array([away.x, away.y, away.z], float), np.array(turn.stack()))
 
 
-def _where(session: Session, camera: Camera) -> str:
+def _where(session: AirSimSession, camera: AirSimCamera) -> str:
     return f"{session.rpc.where}: camera {camera.name!r} for {camera.image.name}"
 
 
-def _told(settings: dict[str, Any], vehicle: str, camera: Camera) -> float | None:
+def _told(settings: dict[str, Any], vehicle: str, camera: AirSimCamera) -> float | None:
     """The field of view in the settings, degrees. None if they do not give it."""
     vehicles = settings.get("Vehicles")
     if not isinstance(vehicles, dict):

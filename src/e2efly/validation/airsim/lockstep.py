@@ -37,7 +37,7 @@ _REST_S, _REST_SPEED = 3.0, 0.02
 """A vehicle is at rest if its speed falls below the second number, m/s, within the first number, s."""
 
 
-class Session:
+class AirSimSession:
     """One vehicle of one AirSim that is controlled, armed and paused."""
 
     def __init__(self, rpc: Rpc, vehicle: str = "") -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.validation.airsim.lockstep import Session
+from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.plant import RigidState
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, inertia_tensor
@@ -38,7 +38,7 @@ _STILL = np.zeros(3)
 
 
 @dataclass(frozen=True)
-class Model:
+class AirSimModel:
     """The measured effects of throttle and rate commands."""
 
     thrust: float
@@ -62,7 +62,7 @@ class Model:
         return np.asarray(rate_gain, float) / self.turn
 
 
-def measure(session: Session) -> Model:
+def measure(session: AirSimSession) -> AirSimModel:
     """Measure the vehicle with several throttles, a throttle step, rotations, and flights in three directions.
 
     Raises:
@@ -90,10 +90,10 @@ def measure(session: Session) -> Model:
         drag.append(-float(axis @ _acceleration(session, _STILL, hover)))
     if not all(np.isfinite(turn)) or min(turn) <= 0:
         raise ValueError(f"{where}: answers to body rates with {turn} rad/s^2; accepted: turns the way it is told")
-    return Model(slope, offset, lag, np.array(turn), np.array(drag))
+    return AirSimModel(slope, offset, lag, np.array(turn), np.array(drag))
 
 
-def hold(session: Session, rates: np.ndarray, throttle: float, seconds: float) -> float:
+def hold(session: AirSimSession, rates: np.ndarray, throttle: float, seconds: float) -> float:
     """Hold a command for `seconds`. Returns the simulated time that has passed, s."""
     count = max(int(np.ceil(seconds / LONG_S - 1e-9)), 1)
     passed = 0.0
@@ -103,7 +103,7 @@ def hold(session: Session, rates: np.ndarray, throttle: float, seconds: float) -
     return passed
 
 
-def differences(model: Model, vehicle: Vehicle) -> list[str]:
+def differences(model: AirSimModel, vehicle: Vehicle) -> list[str]:
     """Differences between AirSim's vehicle and another one, one sentence each.
 
     AirSim's rate loop is given the vehicle's gains.
@@ -147,14 +147,14 @@ def _lag_of(vehicle: Vehicle) -> float:
     return float(vehicle.motor_time_constant * np.log((last - first) / (last - then)))
 
 
-def _spin(session: Session, start: RigidState, throttle: float) -> None:
+def _spin(session: AirSimSession, start: RigidState, throttle: float) -> None:
     """Bring the rotors to the speed of a throttle, and put the vehicle at rest at a place."""
     session.place(start)
     hold(session, _STILL, throttle, SPUN_S)
     session.place(start)
 
 
-def _acceleration(session: Session, rates: np.ndarray, throttle: float) -> np.ndarray:
+def _acceleration(session: AirSimSession, rates: np.ndarray, throttle: float) -> np.ndarray:
     """Mean acceleration over a few physics steps, world, m/s^2.
 
     The first steps do not count. In its first step AirSim averages the acceleration with the previous one, which does
@@ -166,7 +166,7 @@ def _acceleration(session: Session, rates: np.ndarray, throttle: float) -> np.nd
     return (session.state().velocity - before) / passed
 
 
-def _lag(session: Session, start: RigidState, hover: float) -> float:
+def _lag(session: AirSimSession, start: RigidState, hover: float) -> float:
     """Time after which thrust has followed 63 % of a step from hover, s."""
     _spin(session, start, hover)
     more, times, thrusts, passed = _SHARE + (1 - _SHARE) * hover, [0.0], [0.0], 0.0
@@ -185,7 +185,7 @@ def _lag(session: Session, start: RigidState, hover: float) -> float:
     return float(times[first - 1] + (times[first] - times[first - 1]) * (level - before) / (after - before))
 
 
-def _bandwidth(session: Session, axis: np.ndarray, hover: float, lag: float) -> float:
+def _bandwidth(session: AirSimSession, axis: np.ndarray, hover: float, lag: float) -> float:
     """Bandwidth K of the rate loop about an axis, 1/s, from the decay of the rate error after a rate command.
 
     With a first-order lag T of the rotors, the decay rate is the slower root p of T p^2 - p + K = 0.

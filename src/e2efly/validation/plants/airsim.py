@@ -8,8 +8,8 @@ import numpy as np
 from e2efly.control import COMMAND_MODES
 from e2efly.flight.pilot.hover import controlled, rates_of
 from e2efly.policy.contract import Contract
-from e2efly.validation.airsim.airsim_camera import Camera, camera_of, opened, taken
-from e2efly.validation.airsim.lockstep import Session
+from e2efly.validation.airsim.airsim_camera import AirSimCamera, camera_of, opened, taken
+from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.airsim.rpc import PORT, Rpc
 from e2efly.validation.airsim.vehicle_model import LONG_S, SPUN_S, differences, hold, measure
 from e2efly.validation.plant import MOMENT, Plant, RigidState, Shutter, check_mode
@@ -115,13 +115,13 @@ class AirsimPlant(Plant):
         if COMMAND_MODES[mode].controller is None:
             raise ValueError(f"plant 'airsim' takes no {mode!r} commands; accepted: policies of other modes")
         self.vehicle, self.mode = vehicle, mode
-        self._cameras: list[Camera] = []
+        self._cameras: list[AirSimCamera] = []
         self._shutters: Mapping[str, Shutter] = {}
         self._films: dict[str, list[np.ndarray]] = {}
         self._time = 0.0  # time since the last reset, s
         rpc = Rpc(self.host, self.port)
         try:
-            self._session = Session(rpc, self.named)
+            self._session = AirSimSession(rpc, self.named)
         except BaseException:
             rpc.close()
             raise

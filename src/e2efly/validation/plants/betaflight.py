@@ -92,7 +92,7 @@ class BetaflightPlant(Plant):
 
     def reset(self, state: RigidState) -> None:
         """Disarm, arm, bring the rotors to hover speed while the body is held in place, and release it."""
-        from e2efly.validation.world import Body
+        from e2efly.validation.world import FlownBody
 
         rig, mid = self._rig, self._sticks.centre
         closed = self._sticks.arrange((mid, mid, mid, 1000), ())
@@ -101,7 +101,7 @@ class BetaflightPlant(Plant):
         speed = np.full(4, self._body.hover_rotor_speed)
         rig.held, zero = True, np.zeros(3)
         rig.wind, rig.thrust_shares = np.zeros(3), np.ones(4)
-        rig.state = Body(state.position, zero, np.array([1.0, 0, 0, 0]), zero, speed)
+        rig.state = FlownBody(state.position, zero, np.array([1.0, 0, 0, 0]), zero, speed)
         for armed, channels, seconds in (
             (False, closed, DISARMED_S), (True, closed, ARMED_S), (True, spinning, SPINNING_S),
         ):  # fmt: skip
@@ -109,7 +109,7 @@ class BetaflightPlant(Plant):
             for _ in range(round(seconds / FRAME_S)):
                 self._frame(channels, FRAME_S)
         rig.held = False
-        rig.state = Body(state.position, state.velocity, state.quaternion, state.body_rate, speed)
+        rig.state = FlownBody(state.position, state.velocity, state.quaternion, state.body_rate, speed)
 
     def step(self, command: np.ndarray, dt: float) -> None:
         """Hold a command for `dt` s, and send it again at least every `FRAME_S`."""

@@ -16,7 +16,7 @@ from jaxtyping import Float, UInt8
 from e2efly.config.drawing import Face, Line
 from e2efly.simulation.scenes.faces import box, cylinder
 from e2efly.simulation.scenes.meshes.engine import needed
-from e2efly.viewing.watch.stage import Frame, Source, Stage
+from e2efly.viewing.watch.stage import Source, Stage, StageFrame
 from e2efly.viewing.watch.triangles import (
     BEHIND,
     GOAL,
@@ -201,7 +201,7 @@ def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
     )
 
 
-def _flying(shape: Quadrotor, frame: Frame, angle: np.ndarray, goal: float) -> Soup:
+def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, goal: float) -> Soup:
     """The vehicles, and the goal of the first vehicle with the half width `goal`, m."""
 
     def placed(mesh: Mesh, place: np.ndarray, attitude: np.ndarray) -> Mesh:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from e2efly.viewing.watch.stage import Frame
+from e2efly.viewing.watch.stage import StageFrame
 from e2efly.viewing.watch.viewer import CAMERAS, Viewer
 
 if TYPE_CHECKING:
     from e2efly.viewing.watch.recorded import Recording
-    from e2efly.viewing.watch.report import Shown
+    from e2efly.viewing.watch.report import ShownReport
     from e2efly.viewing.watch.simulation import Simulation
-    from e2efly.viewing.watch.training import Progress
+    from e2efly.viewing.watch.training import ShownProgress
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 """Speeds of the flight, relative to real time."""
@@ -87,7 +87,7 @@ class Panel:
         while not self.wishes.empty():
             self.wishes.get()()
 
-    def show(self, frame: Frame, elapsed: float) -> None:
+    def show(self, frame: StageFrame, elapsed: float) -> None:
         """Show the data of a frame other than the positions of the vehicles."""
         if frame.note != self._shown:
             self._shown = frame.note
@@ -112,7 +112,7 @@ class Panel:
         self.viewer.camera = camera
         self.viewer.follow(self.viewer.followed)
 
-    def _show_images(self, frame: Frame) -> None:
+    def _show_images(self, frame: StageFrame) -> None:
         for name, image in frame.images.items():
             picture = _enlarged(image)
             if name in self._images:
@@ -205,7 +205,7 @@ def _drag(panel: Panel, simulation: "Simulation") -> None:
     arrows.on_update(lambda _: panel.wishes.put(partial(move, np.array(arrows.position, float))))
 
 
-def policies_on(panel: Panel, progress: "Progress") -> Callable[[], None]:
+def policies_on(panel: Panel, progress: "ShownProgress") -> Callable[[], None]:
     """Add the controls of a run's policies: always the newest, or one of the older ones.
 
     Args:
@@ -287,7 +287,7 @@ def times_on(panel: Panel, recording: "Recording") -> Callable[[], None]:
     return between
 
 
-def starts_on(panel: Panel, recording: "Recording", starts: "Sequence[Shown]") -> None:
+def starts_on(panel: Panel, recording: "Recording", starts: "Sequence[ShownReport]") -> None:
     """Add a menu to choose the start of a report whose flights are shown.
 
     Args:

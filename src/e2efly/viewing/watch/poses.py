@@ -8,11 +8,11 @@ import numpy as np
 
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pose_source import PoseSource
-from e2efly.flight.pose.tracking import Track, track
+from e2efly.flight.pose.tracking import PoseTrack, track
 from e2efly.policy.odometry import Odometry
-from e2efly.simulation.scenes.faces import Body
+from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.viewing.watch.stage import Frame, Stage
+from e2efly.viewing.watch.stage import Stage, StageFrame
 
 LOST_S, RESTART_S = 0.3, 1.0
 """`LOST_S`: a pose older than this is reported as lost, s. `RESTART_S`: after this time without a good pose, tracking
@@ -29,14 +29,14 @@ class Poses:
     """An open pose source. The caller that opened it closes it."""
     vehicle: Vehicle
     """The vehicle that is drawn."""
-    bodies: Sequence[Body] = ()
+    bodies: Sequence[FacesBody] = ()
     """Solids in the world of the poses."""
     period: float = field(default=1 / 30, init=False)
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3), init=False)
 
     def __post_init__(self) -> None:
         self._stage = Stage(self.vehicle, self.bodies)
-        self._track, self._odometry, self._received = Track(), None, -np.inf
+        self._track, self._odometry, self._received = PoseTrack(), None, -np.inf
         self._checks = Checks(max_age=LOST_S, frozen_after=np.inf, out_of_order="ignore")
         self._began = time.monotonic()
         self._refused: str | None = None
@@ -47,12 +47,12 @@ class Poses:
         del followed
         return self._stage
 
-    def step(self, followed: int) -> Frame:
+    def step(self, followed: int) -> StageFrame:
         """The vehicle at its last pose. Before the first pose, far below the ground."""
         del followed
         now = time.monotonic()
         if self._track.fault and now - self._received > RESTART_S:
-            self._track = Track()
+            self._track = PoseTrack()
         for sample in self.source.read(now):
             self._track, odometry, self._refused = track(self._checks, self._track, sample)
             if odometry is not None:
@@ -62,12 +62,12 @@ class Poses:
         told = f"no good pose from {self.source.describe()}{f' ({self._refused})' if self._refused else ''}"
         if o is None:
             level, still = np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3))
-            return Frame(now - self._began, nowhere, level, still, np.zeros((1, 4)), note=told)
+            return StageFrame(now - self._began, nowhere, level, still, np.zeros((1, 4)), note=told)
         speed = float(np.linalg.norm(o.velocity))
         turning = np.full((1, 4), 0.0 if lost else TURNING)
         place = ", ".join(f"{x:.2f}" for x in o.position)
         note = f"{place} m, {speed:.1f} m/s" + (f"\n{told}" if lost else "")
-        return Frame(
+        return StageFrame(
             now - self._began, o.position[None], o.quaternion[None], o.velocity[None], turning,
             series={"speed (m/s)": (speed,)}, note=note,
         )  # fmt: skip

@@ -12,7 +12,7 @@ from e2efly.logs.flight_log import read_log
 from e2efly.logs.readers import OURS, format_of, read_flights
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.viewing.watch.stage import Frame, Stage
+from e2efly.viewing.watch.stage import Stage, StageFrame
 
 PERIOD = 1 / 30
 """Time between frames, s."""
@@ -21,7 +21,7 @@ POSES = ("position", "quaternion")
 
 
 @dataclass(frozen=True)
-class Flight:
+class RecordedFlight:
     """One recorded flight on a uniform time grid with step `PERIOD`."""
 
     name: str
@@ -44,7 +44,7 @@ class Flight:
     """Events, with their time in s since the start, in order."""
 
 
-def read_flight(path: Path, vehicle: Vehicle) -> Flight:
+def read_flight(path: Path, vehicle: Vehicle) -> RecordedFlight:
     """The first flight with poses in a log. Any log that `e2efly identify flight` reads is accepted.
 
     Args:
@@ -72,7 +72,7 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
     return flight
 
 
-def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Flight:
+def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> RecordedFlight:
     """A flight on a uniform time grid, from its first to its last position.
 
     Args:
@@ -92,7 +92,7 @@ def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Fli
     position, quaternion = at("position", 3), at("quaternion", 4)
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     flown = np.gradient(position, PERIOD, axis=0) if len(time) > 1 else np.zeros_like(position)
-    return Flight(
+    return RecordedFlight(
         name, position, quaternion, at("velocity", 3) if "velocity" in streams else flown,
         at("rotor_speed", 4, 0.0), at("goal", 3), at("command", 3), at("body_rate", 3),
     )  # fmt: skip
@@ -121,7 +121,7 @@ def vehicle_of(path: Path) -> Vehicle | None:
 class Recording:
     """A source of frames: recorded flights, repeated endlessly."""
 
-    flights: Sequence[Flight]
+    flights: Sequence[RecordedFlight]
     """The flights. They begin at the same time."""
     vehicle: Vehicle
     """The vehicle that is drawn."""
@@ -135,7 +135,7 @@ class Recording:
     def __post_init__(self) -> None:
         self._ground = Stage(self.vehicle)
 
-    def fly(self, flights: Sequence[Flight], stage: Stage) -> None:
+    def fly(self, flights: Sequence[RecordedFlight], stage: Stage) -> None:
         """Show other flights, the same number as before, from their beginning."""
         self.flights, self.stage, self.at = flights, stage, 0
 
@@ -149,7 +149,7 @@ class Recording:
         del followed
         return self.stage or self._ground
 
-    def step(self, followed: int) -> Frame:
+    def step(self, followed: int) -> StageFrame:
         """The next frame. After the last frame comes the first. A flight that is over stays where it ended."""
         i, self.at = self.at, (self.at + 1) % self.length
 
@@ -165,7 +165,7 @@ class Recording:
         tilt = np.degrees(float(Quat.of(now("quaternion")[followed]).tilt()))
         note = f"{i * PERIOD:.1f} s of {self.length * PERIOD:.1f} s, {series['speed (m/s)'][0]:.1f} m/s, "
         note += f"tilted {tilt:.0f} degrees\n{told.name} {mode}"
-        return Frame(
+        return StageFrame(
             i * PERIOD, now("position"), now("quaternion"), now("velocity"), now("rotor_speed"), now("goal"),
             series=series, fresh=i == 0, note=note,
         )  # fmt: skip

@@ -17,7 +17,7 @@ from e2efly.vehicles.vehicle import Controller, Vehicle
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import Pair, flights_file, read_flights
 from e2efly.viewing.watch.poses import TURNING
-from e2efly.viewing.watch.recorded import Flight, even
+from e2efly.viewing.watch.recorded import RecordedFlight, even
 from e2efly.viewing.watch.simulation import stage
 from e2efly.viewing.watch.stage import Stage
 
@@ -39,13 +39,13 @@ class Told:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownReport:
     """One start."""
 
     name: str
     """Label for people: criterion, number, and how the flight ended."""
     criterion: str
-    flights: tuple[Flight, ...]
+    flights: tuple[RecordedFlight, ...]
     """The flight on the plant, then the flight in the training simulator."""
     stage: Stage
     """The world of that start."""
@@ -67,7 +67,7 @@ def report_of(path: Path) -> Path | None:
     return found[0] if found else None
 
 
-def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
+def read_report(path: Path) -> tuple[list[ShownReport], Vehicle]:
     """The starts of a report whose flights were stored, failures first, and the vehicle that flew them.
 
     Their worlds are generated again from the seed.
@@ -87,7 +87,7 @@ def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
     pairs = read_flights(flights_file(path))
     changes = {name.removeprefix("task."): value for name, value in content["changed"].items()}
     flew = candidate(told.policy, told.vehicle, told.controller, task=changes)
-    shown = list[Shown]()
+    shown = list[ShownReport]()
     for criterion, suite in flew.task.criteria().items():
         if criterion not in pairs:
             raise ValueError(f"{flights_file(path)} has no flights of {criterion}; {accepted}")
@@ -103,7 +103,7 @@ def read_report(path: Path) -> tuple[list[Shown], Vehicle]:
                 _flight(f"{criterion} {number} {where}: {ended[place]}", begin, pair.flown[place], row)
                 for place, where in (("plant", f"on {told.plant}"), ("training", "in the training simulator"))
             )
-            shown.append(Shown(name, criterion, flights, stage(flew.flown.body, suite, scene, number)))
+            shown.append(ShownReport(name, criterion, flights, stage(flew.flown.body, suite, scene, number)))
     return shown, flew.flown.body
 
 
@@ -122,7 +122,7 @@ def _check(path: Path, criteria: Mapping[str, Any], criterion: str, pair: Pair, 
             )
 
 
-def _flight(name: str, begin: Any, flights: Flights, row: int) -> Flight:
+def _flight(name: str, begin: Any, flights: Flights, row: int) -> RecordedFlight:
     """One flight, including its start."""
     steps = int(flights.length[row])
     time = np.append(0.0, flights.time[:steps])

@@ -21,7 +21,7 @@ from e2efly.simulation.device import fast_compile, wide_vectors
 from e2efly.simulation.scenes.faces import bodies
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.image_plots import in_colours
-from e2efly.viewing.watch.stage import Frame, Stage
+from e2efly.viewing.watch.stage import Stage, StageFrame
 
 HELD = ("mass", "inertia", "thrust_map")
 """Parameters of the vehicle that the user can change."""
@@ -187,7 +187,7 @@ class Simulation:
         """Whether the goal may only be moved horizontally, because there are obstacles, or the ground to land on."""
         return bool(self.env.cameras) or getattr(self.env.task, "lands", False) or bool(self._scene().kinds)
 
-    def step(self, followed: int) -> Frame:
+    def step(self, followed: int) -> StageFrame:
         """The frame after the next control step."""
         images = tuple(np.asarray(image) for image in self._state.images)
         action, self._memory = self.act.act(self._observation, images, self._memory)
@@ -203,7 +203,7 @@ class Simulation:
         self._began = False
         if done[followed] and (self.env.cameras or self.task.own_worlds):
             self._stage = None  # it has another world now; the other vehicles' worlds stay and need not be drawn again
-        return Frame(
+        return StageFrame(
             time=float(seen["time"][followed]),
             position=seen["position"] + self._origin,
             quaternion=seen["quaternion"],

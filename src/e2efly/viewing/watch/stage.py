@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from e2efly.config.drawing import Thing
-from e2efly.simulation.scenes.faces import Body
+from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.vehicles.vehicle import Vehicle
 
 
@@ -18,7 +18,7 @@ class Stage:
 
     vehicle: Vehicle
     """The vehicle that flies. Its shape is drawn from the positions of its rotors."""
-    bodies: Sequence[Body] = ()
+    bodies: Sequence[FacesBody] = ()
     """Solids, at time 0."""
     things: Sequence[Thing] = ()
     """Objects of the task in space."""
@@ -27,7 +27,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Frame:
+class StageFrame:
     """One moment of n vehicles."""
 
     time: float
@@ -67,7 +67,7 @@ class Source(Protocol):
         """The stage of a vehicle's world. It is the same object until the stage changes."""
         ...
 
-    def step(self, followed: int) -> Frame:
+    def step(self, followed: int) -> StageFrame:
         """The next frame.
 
         Args:

@@ -19,7 +19,7 @@ LOOK_S = 0.5
 
 
 @dataclass
-class Progress:
+class ShownProgress:
     """The policies that a run has, and the one that flies."""
 
     run: RunDirectory
@@ -90,10 +90,10 @@ def _act(actor: Actor, weights: Any, observation: Any, images: Any, memory: Any)
     return actor(weights, actor.features(observation, images), memory)
 
 
-def of_run(run: RunDirectory) -> Progress:
+def of_run(run: RunDirectory) -> ShownProgress:
     """The progress of a run, for watching it.
 
     Raises:
         ValueError: when the folder holds no run, or a run of another version.
     """
-    return Progress(run, Setup.of(run.config()))
+    return ShownProgress(run, Setup.of(run.config()))

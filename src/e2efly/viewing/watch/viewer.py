@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from e2efly.config.drawing import Face, Line, Mark
 from e2efly.logs.scripts.origins import refusal
-from e2efly.simulation.scenes.faces import Body
+from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.viewing.watch.port import free_port
-from e2efly.viewing.watch.stage import Frame, Stage
+from e2efly.viewing.watch.stage import Stage, StageFrame
 from e2efly.viewing.watch.triangles import (
     BEHIND,
     GOAL,
@@ -118,7 +118,7 @@ class Viewer:
         self._root = self._scene.add_frame("/world/task", show_axes=False)
         self._stage: Stage | None = None
         self._standing: Any = None
-        self._moving: list[tuple[Body, Any]] = []
+        self._moving: list[tuple[FacesBody, Any]] = []
         self._bodies: list[Any] = []
         self._rotors: Any = None
         self._goals: Any = None
@@ -127,7 +127,7 @@ class Viewer:
         self._line: Any = None
         self._offset, self._placed = np.zeros(3), False
 
-    def show(self, stage: Stage, origin: Float[np.ndarray, "3"], frame: Frame, elapsed: float) -> None:
+    def show(self, stage: Stage, origin: Float[np.ndarray, "3"], frame: StageFrame, elapsed: float) -> None:
         """Show a frame.
 
         Args:
@@ -217,7 +217,7 @@ class Viewer:
                     place = tuple(map(float, thing.point))
                     self._scene.add_label(name, thing.text, position=place, anchor="center-center")
 
-    def _fly(self, frame: Frame, elapsed: float) -> None:
+    def _fly(self, frame: StageFrame, elapsed: float) -> None:
         p = np.asarray(frame.position + self._offset, np.float32)
         q = np.asarray(frame.quaternion, np.float32)
         self._angle = (self._angle + self._shape.spin * frame.rotor_speed / SLOWEST * max(elapsed, 0.0)) % (2 * np.pi)
@@ -233,7 +233,7 @@ class Viewer:
             if known and frame.goal is not None:
                 node.position = tuple(map(float, frame.goal[row]))
 
-    def _draw_trail(self, frame: Frame) -> None:
+    def _draw_trail(self, frame: StageFrame) -> None:
         if frame.fresh:
             self._trail.clear()
         here, speed = frame.position[self.followed].copy(), float(np.linalg.norm(frame.velocity[self.followed]))
@@ -256,7 +256,7 @@ class Viewer:
         self.followed = row
         self._trail.clear()
 
-    def _look(self, frame: Frame) -> None:
+    def _look(self, frame: StageFrame) -> None:
         """Keep the followed vehicle in view. The world moves past the vehicle, so that users can still move their
         cameras.
 

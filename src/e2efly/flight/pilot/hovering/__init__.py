@@ -9,8 +9,17 @@ DEFAULT = "pid"
 """The hover controller that flies if none is named."""
 
 __all__ = [
-    "DEFAULT", "HOVERS", "ROTOR_SPEED", "HoverController", "Seen", "UnderWay", "ahead", "hover_controller", "register",
-    "sent", "thrust_of",
+    "DEFAULT",
+    "HOVERS",
+    "ROTOR_SPEED",
+    "HoverController",
+    "Seen",
+    "UnderWay",
+    "ahead",
+    "hover_controller",
+    "register",
+    "sent",
+    "thrust_of",
 ]  # fmt: skip
 _SHIPPED = geometric, indi, mpc, pid  # these modules register their controllers when imported
 

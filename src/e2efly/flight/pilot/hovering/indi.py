@@ -32,7 +32,7 @@ already have learned mass and battery, so the increments must not compensate for
 
 
 @dataclass(frozen=True)
-class Felt:
+class FeltResponse:
     """What was measured in one flight."""
 
     pushed: Vec3 = ZERO
@@ -63,13 +63,20 @@ class Indi:
         """See `HoverController.of`."""
         return cls(flight_gains(vehicle, residue(latency) + hold / 2), latency)
 
-    def begin(self) -> Felt:
+    def begin(self) -> FeltResponse:
         """The memory without any push."""
-        return Felt()
+        return FeltResponse()
 
     def step(
-        self, memory: Felt, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
-    ) -> tuple[Felt, Ctbr]:
+        self,
+        memory: FeltResponse,
+        seen: Seen,
+        under_way: UnderWay,
+        place: Place,
+        dt: float,
+        *,
+        held: bool = False,
+    ) -> tuple[FeltResponse, Ctbr]:
         """See `HoverController.step`."""
         vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)
         if not held:
@@ -81,15 +88,17 @@ class Indi:
         return memory, steer(vehicle, motion, wanted, goal, memory.slip)
 
 
-def felt(before: Felt, seen: Seen, under_way: UnderWay, dt: float) -> Felt:
+def felt(before: FeltResponse, seen: Seen, under_way: UnderWay, dt: float) -> FeltResponse:
     """The memory after a step of `dt` s."""
     slip = slipped(before.slip, seen, under_way, dt)
     if seen.force is None:
-        return Felt(before.pushed, slip, before.share)
+        return FeltResponse(before.pushed, slip, before.share)
     gave, share = under_way.thrust, before.share
     if seen.thrust is not None:
         now = under_way.thrust / seen.thrust
         share = now if share is None else share + (now - share) * (1 - math.exp(-dt / UNITS_S))
         gave = share * seen.thrust
     push = seen.attitude.rotate(seen.force - Vec3(0.0, 0.0, gave))
-    return Felt((before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), slip, share)
+    return FeltResponse(
+        (before.pushed + (push - before.pushed) * (1 - math.exp(-dt / FILTER_S))).clip(LIMIT), slip, share
+    )

@@ -5,7 +5,7 @@ import pkgutil
 
 from e2efly.config.registry import load, load_installed, referenced
 from e2efly.flight.pose.pose_source import PoseSource
-from e2efly.flight.pose.registry import SOURCES, Kind, opened
+from e2efly.flight.pose.registry import SOURCES, PoseKind, opened
 
 for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_file.name)
@@ -30,7 +30,7 @@ def open_source(text: str) -> PoseSource:
         return opened(SOURCES[name], text, where)
     if found := referenced(text):
         own = load(found[0])
-        known = next((kind for kind in SOURCES.values() if kind.open is own), Kind(own, f"{found[0]}[:...]"))
+        known = next((kind for kind in SOURCES.values() if kind.open is own), PoseKind(own, f"{found[0]}[:...]"))
         return opened(known, text, found[1])
     forms = "; ".join(kind.form for kind in SOURCES.values())
     raise ValueError(f"pose source is {text!r}; accepted: {forms}; or path/to/file.py:Name[:...]")

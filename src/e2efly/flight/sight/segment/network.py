@@ -34,7 +34,7 @@ GROWING = ("Pad", "Resize")
 """Operators of which all inputs after the first are constants: these say how large the output is."""
 
 
-class Network:
+class PadNetwork:
     """A mask of the pixels for which the network's probability is above one half."""
 
     def __init__(self, path: Path) -> None:
@@ -109,13 +109,13 @@ def _check(model: Message) -> None:
         constants |= set(node.get("output", [])) if kind == "Constant" else set()
 
 
-def open_onnx(text: str) -> Network:
+def open_onnx(text: str) -> PadNetwork:
     """Load FILE. If it is omitted, load `OWN`.
 
     Raises:
         ValueError: naming the file and what is accepted.
     """
-    return Network(Path(text).expanduser() if text else OWN)
+    return PadNetwork(Path(text).expanduser() if text else OWN)
 
 
 SEGMENTERS.add("onnx", open_onnx)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from e2efly.config.registry import load, load_installed, referenced
 from e2efly.flight.sight.image_source import ImageSource
-from e2efly.flight.sight.registry import SOURCES, Kind, opened
+from e2efly.flight.sight.registry import SOURCES, ImageKind, opened
 from e2efly.policy.contract import Contract
 from e2efly.policy.images import Image
 
@@ -87,6 +87,6 @@ def open_image(text: str, image: Image) -> ImageSource:
         return opened(SOURCES[name], where, image)
     if found := referenced(text):
         own = load(found[0])
-        known = next((kind for kind in SOURCES.values() if kind.open is own), Kind(own, f"{found[0]}[:...]"))
+        known = next((kind for kind in SOURCES.values() if kind.open is own), ImageKind(own, f"{found[0]}[:...]"))
         return opened(known, found[1], image)
     raise ValueError(f"--image {image.name} is {text!r}; accepted: {forms()}")

@@ -8,7 +8,7 @@ from embreex.rtcore_scene import EmbreeScene
 from jaxtyping import Bool, Float, Int
 
 from e2efly.simulation.device import cores
-from e2efly.simulation.scenes.meshes.engine import Hits
+from e2efly.simulation.scenes.meshes.engine import MeshHits
 from e2efly.simulation.scenes.shapes import FAR
 
 _AT_ONCE = 4096
@@ -36,11 +36,11 @@ class Embree:
 
     def hits(
         self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
-    ) -> Hits:
+    ) -> MeshHits:
         """See `Engine`."""
         shape = (len(origin), rays.shape[1])
         kinds = {"depth": np.float32, "face": np.int32, "u": np.float32, "v": np.float32}
-        found = Hits(**{name: np.empty(shape, kind) for name, kind in kinds.items()})
+        found = MeshHits(**{name: np.empty(shape, kind) for name, kind in kinds.items()})
         for some, start, way in _rays(origin, matrix, rays):
             met = self._scene.run(start, way, dists=FAR, output=1)
             for name, theirs in (("depth", "tfar"), ("face", "primID"), ("u", "u"), ("v", "v")):

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 
-class Hits(NamedTuple):
+class MeshHits(NamedTuple):
     """The first hits of the r rays of each of c cameras."""
 
     depth: Float[np.ndarray, "c r"]
@@ -35,7 +35,7 @@ class Engine(Protocol):
 
     def hits(
         self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
-    ) -> Hits:
+    ) -> MeshHits:
         """All data of the first hits."""
         ...
 

@@ -11,7 +11,7 @@ import numpy as np
 from e2efly.config.names import unknown
 from e2efly.simulation.scenes.meshes.engine import needed
 from e2efly.simulation.scenes.meshes.links import WITHOUT, textured_materials
-from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene, Part
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart, MeshScene
 from e2efly.simulation.scenes.meshes.procedural import SCENES
 
 FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -68,7 +68,7 @@ def load_mesh_scene(
         raise ValueError(f"{path}: {error}") from None
 
 
-def _parts(path: Path, turn: np.ndarray, textured: set[str] | None) -> Iterator[Part]:
+def _parts(path: Path, turn: np.ndarray, textured: set[str] | None) -> Iterator[MeshPart]:
     """The file's objects. `textured`: names of the materials that have a texture. None: no materials."""
     scene = _opened(path, textured is not None)
     objects = _objects(path)
@@ -85,7 +85,7 @@ def _parts(path: Path, turn: np.ndarray, textured: set[str] | None) -> Iterator[
         if np.linalg.det(pose[:3, :3]) < 0:
             faces = faces[:, ::-1]
         try:
-            yield Part(named, vertices, faces, **({} if textured is None else _look(mesh, textured)))
+            yield MeshPart(named, vertices, faces, **({} if textured is None else _look(mesh, textured)))
         except ValueError as error:
             raise ValueError(f"object {named!r}: {error}") from None
 

@@ -21,7 +21,7 @@ _WHITE = np.full((1, 1, 3), 255, np.uint8)
 
 
 @dataclass(frozen=True)
-class Part:
+class MeshPart:
     """A surface with at most one texture. Parts with the same name are one object."""
 
     name: str
@@ -72,7 +72,7 @@ class MeshScene:
     """Number of degenerate triangles of the parts that were left out."""
 
     @staticmethod
-    def of(parts: Sequence[Part]) -> "MeshScene":
+    def of(parts: Sequence[MeshPart]) -> "MeshScene":
         """One world from parts, without their degenerate triangles, which are counted.
 
         Raises:
@@ -169,7 +169,7 @@ class MeshScene:
         return colour * texels[begins[number] + row * width + column] * np.float32(1 / 255)
 
 
-def _check(part: Part) -> None:
+def _check(part: MeshPart) -> None:
     where = f"object {part.name!r}"
     if part.vertices.ndim != 2 or part.vertices.shape[1] != 3 or not _usual(part.vertices):
         raise ValueError(
@@ -205,7 +205,7 @@ def _usual(numbers: Any) -> bool:
     return bool(np.all(np.abs(numbers) <= LARGEST))  # false for NaN
 
 
-def _corner_colours(part: Part, label: int) -> Float[np.ndarray, "f 3 3"]:
+def _corner_colours(part: MeshPart, label: int) -> Float[np.ndarray, "f 3 3"]:
     usual = COLOURS[label] if part.texture is None else np.ones(3)
     colour = np.asarray(usual if part.colour is None else part.colour, np.float32)
     if colour.ndim == 2:

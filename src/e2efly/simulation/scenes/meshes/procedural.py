@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from e2efly.simulation.scenes.meshes.mesh_scene import Part
+from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart
 from e2efly.simulation.scenes.meshes.surfaces import (
     Surface,
     box,
@@ -24,12 +24,12 @@ _CONCRETE, _STEEL, _CARDBOARD = (0.58, 0.58, 0.56), (0.25, 0.33, 0.55), (0.66, 0
 
 def _part(
     name: str, surface: Surface, texture: UInt8[np.ndarray, "h w 3"], metres: float = 1.0, colour: Any = None
-) -> Part:
+) -> MeshPart:
     """An object whose texture is `metres` wide."""
-    return Part(name, surface.vertices, surface.faces, colour, surface.uv / metres, texture)
+    return MeshPart(name, surface.vertices, surface.faces, colour, surface.uv / metres, texture)
 
 
-def warehouse() -> list[Part]:
+def warehouse() -> list[MeshPart]:
     """A hall of 40 x 24 x 8 m with strip lights in the roof, and six rows of racks full of boxes, 3.4 m apart."""
     rng = np.random.default_rng(1)
     wall, floor = striped(rng, (0.72, 0.72, 0.68), 4), speckled(rng, _CONCRETE, 0.06)
@@ -58,7 +58,7 @@ def warehouse() -> list[Part]:
     return found
 
 
-def garage() -> list[Part]:
+def garage() -> list[MeshPart]:
     """A car park of 48 x 30 x 3.2 m, open to the sides above 1.1 m: 28 round columns, beams, and cars between them."""
     rng = np.random.default_rng(2)
     concrete, asphalt = speckled(rng, _CONCRETE, 0.08), speckled(rng, (0.3, 0.3, 0.32), 0.1)
@@ -84,7 +84,7 @@ def garage() -> list[Part]:
     return found
 
 
-def terrain() -> list[Part]:
+def terrain() -> list[MeshPart]:
     """Grassy hills of 64 x 64 m, level in the middle, with 40 firs and 30 rocks."""
     rng = np.random.default_rng(3)
     grass, bark = speckled(rng, (0.33, 0.42, 0.2), 0.18), striped(rng, (0.4, 0.3, 0.2), 6)
@@ -120,7 +120,7 @@ def terrain() -> list[Part]:
     return found
 
 
-def _shell(half_x: float, half_y: float, high: float, wall: np.ndarray, floor: np.ndarray) -> list[Part]:
+def _shell(half_x: float, half_y: float, high: float, wall: np.ndarray, floor: np.ndarray) -> list[MeshPart]:
     """A floor and four walls around it, 0.2 m thick."""
     x, y, thick = half_x, half_y, 0.2
     sides = {
@@ -150,5 +150,5 @@ def _car() -> tuple[Surface, Surface]:
     return join(skin, *ends), join(*wheels)
 
 
-SCENES: dict[str, Callable[[], list[Part]]] = {"garage": garage, "terrain": terrain, "warehouse": warehouse}
+SCENES: dict[str, Callable[[], list[MeshPart]]] = {"garage": garage, "terrain": terrain, "warehouse": warehouse}
 """The scenes by name."""

@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 from jaxtyping import Bool, Float
 
-from e2efly.simulation.scenes.meshes.engine import Hits
+from e2efly.simulation.scenes.meshes.engine import MeshHits
 from e2efly.simulation.scenes.shapes import FAR
 
 wp.config.log_level = wp.LOG_WARNING
@@ -70,9 +70,9 @@ class Warp:
 
     def hits(
         self, origin: Float[np.ndarray, "c 3"], matrix: Float[np.ndarray, "c 3 3"], rays: Float[np.ndarray, "3 r"]
-    ) -> Hits:
+    ) -> MeshHits:
         """See `Engine`."""
-        return Hits(*(array.numpy() for array in self._traced(origin, matrix, rays)))
+        return MeshHits(*(array.numpy() for array in self._traced(origin, matrix, rays)))
 
     def _traced(self, origin: np.ndarray, matrix: np.ndarray, rays: np.ndarray) -> list[wp.array]:
         shape = (len(origin), rays.shape[1])
