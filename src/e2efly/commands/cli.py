@@ -83,11 +83,12 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         raise
     except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] not in WHOLE:
+        missing = error.name or ""
+        if missing.split(".")[0] not in WHOLE and not missing.startswith("e2efly."):
             raise
         console.print("error:", style="bold red", end=" ")
         console.print(
-            f"`e2efly {arguments[0]}` needs {error.name}, which is not installed: this is the part of e2efly that "
+            f"`e2efly {arguments[0]}` needs {missing}, which is not installed: this is the part of e2efly that "
             "flies, e2efly-fly; accepted: `fly`, or an environment with the whole, `pip install e2efly`"
         )
         return 2
