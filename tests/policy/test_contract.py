@@ -192,6 +192,7 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
         (("observation", 0, "size"), 0, "a whole number, 1 or more"),
         (("observation", 0, "size"), 6.0, "a whole number, 1 or more"),
         (("observation", 0, "size"), 5, "a multiple of 3"),
+        (("observation", 2, "name"), "past_actions", "observation[2].size is 3; accepted: a multiple of 4, as its"),
         (("observation", 1, "size"), 3, "4, as its frame"),
         (("observation", 0, "scale"), 0.0, "a positive number"),
         (("observation", 0, "scale"), math.inf, "a finite number"),

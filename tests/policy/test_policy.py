@@ -174,11 +174,11 @@ def test_what_agrees_is_loaded(path: Path) -> None:
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        ({"task": "race"}, "task of the policy is 'hover', wanted: 'race'; load a policy"),
-        ({"vehicle": load_vehicle("vis_h")}, "vehicle of the policy is 'vis_r', wanted: 'vis_h'; load a policy"),
-        ({"control_rate_hz": 50.0}, "control_rate_hz of the policy is 30.0, wanted: 50.0; run it at"),
-        ({"control_rate_hz": np.nan}, "control_rate_hz of the policy is 30.0, wanted: nan; run it at"),
-        ({"command_mode": "velocity"}, "action.mode of the policy is 'ctbr', wanted: 'velocity'; choose"),
+        ({"task": "race"}, "task is 'race'; accepted: 'hover', for which"),
+        ({"vehicle": load_vehicle("vis_h")}, f"vehicle 'vis_h' has hash {load_vehicle('vis_h').hash}; accepted:"),
+        ({"control_rate_hz": 50.0}, "control_rate is 50.0 Hz; accepted: 30 Hz, at which"),
+        ({"control_rate_hz": np.nan}, "control_rate is nan Hz; accepted: 30 Hz, at which"),
+        ({"command_mode": "velocity"}, "command_mode is 'velocity'; accepted: 'ctbr', for which"),
     ],
 )
 def test_a_mismatch_is_refused(path: Path, wanted: dict, message: str) -> None:
@@ -188,7 +188,7 @@ def test_a_mismatch_is_refused(path: Path, wanted: dict, message: str) -> None:
 
 def test_a_changed_vehicle_is_refused(path: Path) -> None:
     vehicle = dataclasses.replace(load_vehicle("vis_r"), mass=0.76)
-    message = f"vehicle_hash of the policy is {load_vehicle('vis_r').hash!r}, wanted: {vehicle.hash!r}; the parameters"
+    message = f"vehicle 'vis_r' has hash {vehicle.hash}; accepted: {load_vehicle('vis_r').hash}, that of 'vis_r'"
     with pytest.raises(ValueError, match=re.escape(message)):
         load_policy(path, vehicle=vehicle)
 

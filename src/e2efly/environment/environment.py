@@ -7,6 +7,7 @@ differentiable, except the events and the images.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -34,7 +35,7 @@ from e2efly.environment.env_state import DISTURBED, INERTIAL, SEEN, STARTS, EnvS
 from e2efly.environment.limits import latencies_of, limits_of, posterior_of
 from e2efly.environment.rules import check
 from e2efly.environment.signals import dangers, happened
-from e2efly.policy.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, VELOCITY, Field, past_actions
+from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
@@ -63,7 +64,7 @@ DEFAULT = EnvConfig()
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
         "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "noise", "imu", "cameras",
     ],
-    meta_fields=["queue", "seen_actions", "past", "family"],
+    meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
 )  # fmt: skip
 @dataclass(frozen=True)
 class Env:
@@ -100,6 +101,8 @@ class Env:
     family: Family | None = None
     """The family, if every episode has a different vehicle, which its flight controller knows. `physics` holds the
     middle one."""
+    unseen: tuple[str, ...] = ()
+    """Names of the vehicle's own fields (`e2efly.policy.observation.OWN`) that are not observed."""
 
     @staticmethod
     def of(
@@ -203,9 +206,17 @@ class Env:
     @property
     def fields(self) -> tuple[Field, ...]:
         """The observation, field by field."""
-        sensed = () if self.imu is None else (GYROSCOPE, ACCELEROMETER)
-        last = (past_actions(self.seen_actions),) if self.seen_actions else ()
-        return (*self.task.fields, ATTITUDE, VELOCITY, BODY_RATE, *sensed, *last)
+        return (*self.task.fields, *(row.field for row in self._own))
+
+    @property
+    def _own(self) -> tuple[Own, ...]:
+        rows = own_fields(imu=self.imu is not None, actions=self.seen_actions)
+        return tuple(row for row in rows if row.field.name not in self.unseen)
+
+    def showing(self, names: Sequence[str]) -> "Env":
+        """The same environment, with only those of the vehicle's own fields that have these names."""
+        hidden = (row.field.name for row in self._own if row.field.name not in names)
+        return dataclasses.replace(self, unseen=(*self.unseen, *hidden))
 
     @property
     def observation_size(self) -> int:
@@ -435,9 +446,6 @@ class Env:
             seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:
             seen = add_noise(self.noise, state.key_of(SEEN), seen)
-        n = seen.position.shape[0]
-        parts = [self.task.observe(state.memory, state.time, seen), seen.quaternion, seen.velocity, seen.body_rate]
-        if state.imu is not None:
-            parts += [state.imu.gyroscope, state.imu.accelerometer]
-        parts.append(state.actions[:, : self.seen_actions].reshape(n, -1))
-        return jnp.concatenate(parts, axis=-1)
+        known = Known(seen, state.imu, state.actions[:, : self.seen_actions])
+        own = (row.value(known) for row in self._own)
+        return jnp.concatenate([self.task.observe(state.memory, state.time, seen), *own], axis=-1)

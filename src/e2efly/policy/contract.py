@@ -18,7 +18,7 @@ from e2efly.control import COMMAND_MODES
 from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
-from e2efly.policy.observation import Field
+from e2efly.policy.observation import PAST_ACTIONS, Field, Own, own_fields
 from e2efly.vehicles.family import Ranges
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
@@ -65,6 +65,11 @@ class Action:
         """Smallest and largest command, in `units`."""
         (a, b, c, d), (e, f, g, h) = self.low, self.high
         return (a, b, c, d), (e, f, g, h)
+
+    def command(self, action: np.ndarray) -> np.ndarray:
+        """The commands for actions, (..., 4) float64, by `mapping`. Actions are clipped to `limits`."""
+        low, high = np.array(self.low), np.array(self.high)
+        return low + (np.clip(np.asarray(action, np.float64), *ACTION_LIMITS) + 1) / 2 * (high - low)
 
     def asking(self, command: np.ndarray) -> np.ndarray:
         """The action that gives a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
@@ -118,20 +123,26 @@ class Contract:
         """
         return outside(self.courses or (), courses)
 
-    def refusals(self, vehicle: Vehicle) -> tuple[str, ...]:
-        """The reasons why the policy does not fly a (loaded) vehicle, in words. Empty: it flies it.
+    def refusals(self, vehicle: Vehicle | None = None, control_rate: float | None = None) -> tuple[str, ...]:
+        """The reasons why the policy does not fly a (loaded) vehicle at a rate, Hz, in words. Empty: it does.
 
         It flies the vehicle that it was trained on, or all vehicles within its ranges, with the delays of its training.
+        What is None is not compared.
         """
-        if self.vehicle_ranges is not None:
+        rate, reasons = self.control_rate_hz, list[str]()
+        if vehicle is None:
+            pass
+        elif self.vehicle_ranges is not None:
             late = self.latency_range_s
-            return dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
-        if vehicle.hash == self.vehicle_hash:
-            return ()
-        return (
-            f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
-            f"{self.vehicle!r} as the policy was trained on it: load that one, or train the policy again",
-        )
+            reasons += dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
+        elif vehicle.hash != self.vehicle_hash:
+            reasons.append(
+                f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
+                f"{self.vehicle!r} as the policy was trained on it: load that one, or train the policy again"
+            )
+        if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:  # true for NaN
+            reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")
+        return tuple(reasons)
 
     def latency_of(self, vehicle: Vehicle) -> float:
         """Latency from observation to command with which a vehicle flies, s. A vehicle of a family has its own."""
@@ -147,6 +158,22 @@ class Contract:
         """The position of each field in the observation, by name, in order."""
         ends = list(accumulate(field.size for field in self.observation))
         return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
+
+    @cached_property
+    def past_actions(self) -> int:
+        """Number of its own last actions that it sees."""
+        return sum(field.size for field in self.observation if field.name == PAST_ACTIONS) // ACTION_SIZE
+
+    @cached_property
+    def own(self) -> tuple[Own, ...]:
+        """The vehicle's own fields that it sees, in the order of the table."""
+        rows = own_fields(imu=True, actions=self.past_actions)
+        return tuple(row for row in rows if row.field.name in self.slices)
+
+    @property
+    def sees_imu(self) -> bool:
+        """Whether it sees measurements of an IMU."""
+        return any(row.source == "imu" for row in self.own)
 
     @cached_property
     def attitude(self) -> str:
@@ -263,16 +290,16 @@ def _observation(value: Any) -> tuple[Field, ...]:
 
 def _field(value: Any, where: str) -> Field:
     x = read.table(value, where, Field)
-    size, frame = read.whole(x["size"], f"{where}.size", 1), read.text(x["frame"], f"{where}.frame")
-    if frame not in FRAMES:
-        raise read.refusal(f"{where}.frame", frame, " or ".join(map(repr, FRAMES)))
+    size, frame = read.whole(x["size"], f"{where}.size", 1), read.one_of(x["frame"], f"{where}.frame", FRAMES)
     if (frame == "world" and size % 3) or (frame == "world_body" and size != 4):
         needed = "a multiple of 3, as its frame is 'world'" if frame == "world" else "4, as its frame is 'world_body'"
         raise read.refusal(f"{where}.size", size, needed)
+    name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
+    if name == PAST_ACTIONS and size % ACTION_SIZE:
+        raise read.refusal(f"{where}.size", size, f"a multiple of {ACTION_SIZE}, as its name is {name!r}")
     scale = read.number(x["scale"], f"{where}.scale")
     if scale <= 0:
         raise read.refusal(f"{where}.scale", scale, "a positive number")
-    name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
     return Field(name, size, frame, unit, scale, text)
 
 
@@ -291,9 +318,7 @@ def _images(value: Any, rate: float) -> tuple[Image, ...]:
 
 def _action(value: Any) -> Action:
     x = read.table(value, "action", Action)
-    mode = read.text(x["mode"], "action.mode")
-    if mode not in COMMAND_MODES:
-        raise read.refusal("action.mode", mode, " or ".join(map(repr, COMMAND_MODES)))
+    mode = read.one_of(x["mode"], "action.mode", COMMAND_MODES)
     fields, units = COMMAND_MODES[mode].fields, COMMAND_MODES[mode].units
     for key, accepted in (("fields", fields), ("units", units)):
         if x[key] != list(accepted):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime as ort
 
-from e2efly.policy.contract import ACTION_LIMITS, ACTION_SIZE, METADATA_KEY, Contract
+from e2efly.policy.contract import ACTION_SIZE, METADATA_KEY, Contract
 from e2efly.policy.onnx_file import METADATA, Message, check_seal, file_content, is_sealed, read, sealed, write
 from e2efly.policy.onnx_graph import FLOAT, IR_VERSION, OPSET, TYPES, check
 from e2efly.policy.onnx_session import open_session
@@ -94,8 +94,7 @@ class Policy:
             raise ValueError(f"action has shape {a.shape}; accepted: ({ACTION_SIZE},) or (n, {ACTION_SIZE})")
         if not np.isfinite(a).all():
             raise ValueError(f"action is {a.tolist()}; accepted: finite numbers")
-        low, high = np.array(self.contract.action.low), np.array(self.contract.action.high)
-        return low + (np.clip(a, *ACTION_LIMITS) + 1) / 2 * (high - low)
+        return self.contract.action.command(a)
 
     def _seen(self, images: Sequence[np.ndarray], lead: tuple[int, ...]) -> dict[str, np.ndarray]:
         """The images by name, checked."""
@@ -160,7 +159,13 @@ def load_policy(
         vehicle = load_vehicle(vehicle)
     path = policy_file(policy, vehicle.name if vehicle and vehicle.name in vehicle_names() else None)
     loaded = _policy(str(path), _read(path))
-    _check_use(str(path), loaded.contract, task, vehicle, control_rate_hz, command_mode)
+    contract = loaded.contract
+    reasons = contract.refusals(vehicle, control_rate_hz)
+    for name, value, own in (("task", task, contract.task), ("command_mode", command_mode, contract.action.mode)):
+        if value is not None and value != own:
+            reasons += (f"{name} is {value!r}; accepted: {own!r}, for which the policy was trained",)
+    if reasons:
+        raise ValueError(f"{path}: {'; '.join(reasons)}")
     return loaded
 
 
@@ -273,38 +278,6 @@ def _declared(graph: Message, side: str) -> list[tuple[str, str, list[int | str]
         axes = [axis.get("dim_value", axis.get("dim_param", "?")) for axis in tensor.get("shape", {}).get("dim", [])]
         found.append((value.get("name", ""), kind, axes))
     return found
-
-
-def _check_use(
-    where: str,
-    contract: Contract,
-    task: str | None,
-    vehicle: Vehicle | None,
-    control_rate_hz: float | None,
-    command_mode: str | None,
-) -> None:
-    """Compare what the policy was trained for with what it is going to fly."""
-    if task is not None and task != contract.task:
-        raise _mismatch(where, "task", contract.task, task, "load a policy that was trained for this task")
-    if vehicle is not None and contract.vehicle_ranges is not None:
-        if reasons := contract.refusals(vehicle):
-            raise ValueError(f"{where}: {'; '.join(reasons)}")
-    elif vehicle is not None and vehicle.name != contract.vehicle:
-        remedy = "load a policy that was trained for this vehicle, or name the vehicle that it was trained for"
-        raise _mismatch(where, "vehicle", contract.vehicle, vehicle.name, remedy)
-    elif vehicle is not None and vehicle.hash != contract.vehicle_hash:
-        remedy = f"the parameters of {vehicle.name!r} have changed since: restore its file, or train the policy again"
-        raise _mismatch(where, "vehicle_hash", contract.vehicle_hash, vehicle.hash, remedy)
-    if control_rate_hz is not None and not abs(control_rate_hz - contract.control_rate_hz) <= 1e-6 * control_rate_hz:
-        remedy = "run it at the rate that it was trained at"
-        raise _mismatch(where, "control_rate_hz", contract.control_rate_hz, control_rate_hz, remedy)
-    if command_mode is not None and command_mode != contract.action.mode:
-        remedy = "choose the command mode that it was trained with"
-        raise _mismatch(where, "action.mode", contract.action.mode, command_mode, remedy)
-
-
-def _mismatch(where: str, field: str, has: object, wanted: object, remedy: str) -> ValueError:
-    return ValueError(f"{where}: {field} of the policy is {has!r}, wanted: {wanted!r}; {remedy}")
 
 
 def _refusal(name: str, part: np.ndarray, good: np.ndarray, accepted: str) -> ValueError:

@@ -1,6 +1,15 @@
-"""What a policy observes, field by field, in the words of the contract. Imports no JAX."""
+"""What a policy observes: the words of a field, and the table of the fields that a vehicle knows of itself.
 
+The training's environment, the runtime in flight and the export to C read this table. A task adds fields of its own
+(`e2efly.policy.goal.Goal.observation`). Imports no JAX.
+"""
+
+import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
+
+from e2efly.control.vectors import Array
 
 
 @dataclass(frozen=True)
@@ -12,7 +21,8 @@ class Field:
     size: int
     """Number of values."""
     frame: str
-    """`world` (ENU), `body` (FLU), `world_body` (a rotation from body to world) or `none`."""
+    """`world` (ENU), `body` (FLU), `world_body` (a rotation from body to world) or `none`. The network turns vectors of
+    the world into the body frame, and a rotation into the world's up axis in the body frame."""
     unit: str
     """Unit of each value."""
     scale: float
@@ -35,3 +45,48 @@ PAST_ACTIONS = "past_actions"
 def past_actions(count: int) -> Field:
     """The field with the policy's last outputs."""
     return Field(PAST_ACTIONS, 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a vehicle knows of itself, or what each of n vehicles knows: JAX arrays in training, NumPy in flight."""
+
+    motion: Any
+    """`position` (*n, 3) world, m; `velocity` (*n, 3) world, m/s; `quaternion` (*n, 4) wxyz, body to world; `body_rate`
+    (*n, 3) body, rad/s. They are as old and as noisy as the vehicle is shown them."""
+    imu: Any
+    """`gyroscope` (*n, 3) body, rad/s; `accelerometer` (*n, 3) body, m/s^2. None: there is no IMU."""
+    past_actions: Array
+    """(*n, k, 4) the last actions, newest first."""
+
+
+@dataclass(frozen=True)
+class Own:
+    """A field that is the same for every task."""
+
+    field: Field
+    value: Callable[[Known], Array]
+    """Computes it, (*n, size). It computes in the library of its arrays (`e2efly.control.vectors.namespace`)."""
+    source: Literal["motion", "imu", "past_actions"] = "motion"
+    """What it needs. A field of the motion is always on, one of the IMU if the IMU is observed."""
+
+
+OWN = (
+    Own(ATTITUDE, lambda known: known.motion.quaternion),
+    Own(VELOCITY, lambda known: known.motion.velocity),
+    Own(BODY_RATE, lambda known: known.motion.body_rate),
+    Own(GYROSCOPE, lambda known: known.imu.gyroscope, "imu"),
+    Own(ACCELEROMETER, lambda known: known.imu.accelerometer, "imu"),
+    Own(past_actions(1), lambda known: known.past_actions.reshape(*known.past_actions.shape[:-2], -1), PAST_ACTIONS),
+)
+"""The table, in the order of the observation, in which they follow the task's own fields. An entry is all that a field
+needs. A policy that was exported before an entry was added goes on without it, in the simulator and in flight."""
+
+
+def own_fields(*, imu: bool, actions: int) -> tuple[Own, ...]:
+    """The rows of the table that there are with or without an IMU, and with a number of past actions."""
+    there = {"motion": True, "imu": imu, PAST_ACTIONS: actions > 0}
+    rows = (row for row in OWN if there[row.source])
+    return tuple(
+        dataclasses.replace(row, field=past_actions(actions)) if row.source == PAST_ACTIONS else row for row in rows
+    )

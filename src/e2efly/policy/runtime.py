@@ -13,17 +13,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from e2efly.control import COMMAND_MODES
-from e2efly.policy.contract import ACTION_SIZE, Contract
+from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Outcome
-from e2efly.policy.observation import ACCELEROMETER, ATTITUDE, BODY_RATE, GYROSCOPE, PAST_ACTIONS, VELOCITY, Field
+from e2efly.policy.observation import Field, Known, own_fields
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.vehicles.vehicle import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
 """Command modes that are converted to collective thrust and body rates. A flight controller accepts no rotor
 thrusts."""
-_STATE_FIELDS = (ATTITUDE, VELOCITY, BODY_RATE, GYROSCOPE, ACCELEROMETER)
-_IMU_FIELDS = (GYROSCOPE.name, ACCELEROMETER.name)
 _ROUNDING = 1e-6
 """Rounding tolerance of the clock, in periods."""
 
@@ -83,10 +81,6 @@ class Runtime:
     envelope: Envelope
     period: float
     """Time between two calls of the policy, s."""
-    low: np.ndarray
-    """(4,) command at action -1."""
-    span: np.ndarray
-    """(4,) difference between the commands at action +1 and -1."""
 
     @staticmethod
     def of(
@@ -120,8 +114,7 @@ class Runtime:
                 reasons += (f"envelope.{name} is {value}; accepted: more than 0",)
         if reasons:
             raise ValueError("\n".join(reasons))
-        low, high = np.array(contract.action.low), np.array(contract.action.high)
-        return Runtime(policy, course, envelope, 1 / contract.control_rate_hz, low, high - low)
+        return Runtime(policy, course, envelope, 1 / contract.control_rate_hz)
 
 
 @dataclass(frozen=True)
@@ -198,10 +191,7 @@ def check(
         imu: whether IMU measurements are available.
         images: whether the images that the contract asks for are available.
     """
-    reasons = list(contract.refusals(vehicle))
-    rate = contract.control_rate_hz
-    if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:
-        reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")
+    reasons = list(contract.refusals(vehicle, control_rate))
     if contract.action.mode not in MODES:
         reasons.append(
             f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
@@ -212,21 +202,20 @@ def check(
             f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
             "accepted: a policy without images (from Python, `Policy.act` takes them)"
         )
-    known = {field.name: field for field in (*shown, *_STATE_FIELDS)}
+    own = own_fields(imu=True, actions=max(contract.past_actions, 1))
+    known = {field.name: field for field in (*shown, *(row.field for row in own))}
+    sensed = {row.field.name for row in own if row.source == "imu"}
     for field in contract.observation:
         same = known.get(field.name)
-        if field.name == PAST_ACTIONS:
-            if field.size % ACTION_SIZE:
-                reasons.append(f"observation field {field.name!r} has size {field.size}; accepted: a multiple of 4")
-        elif same is None:
-            accepted = ", ".join(sorted((*known, PAST_ACTIONS)))
+        if same is None:
+            accepted = ", ".join(sorted(known))
             reasons.append(f"observation field {field.name!r}: nothing on board says it; accepted: {accepted}")
         elif (field.size, field.frame, field.unit) != (same.size, same.frame, same.unit):
             reasons.append(
                 f"observation field {field.name!r} has size {field.size}, frame {field.frame!r} and unit "
                 f"{field.unit!r}; accepted: {same.size}, {same.frame!r} and {same.unit!r}"
             )
-        elif field.name in _IMU_FIELDS and not imu:
+        elif field.name in sensed and not imu:
             reasons.append(f"observation field {field.name!r}: there is no IMU; accepted: a policy without, or an IMU")
     seen = {field.name for field in contract.observation}
     if lacking := [field.name for field in shown if field.name not in seen]:
@@ -246,9 +235,7 @@ def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
         now: the time on the monotonic clock, s. The first action is due at once.
     """
     contract = runtime.policy.contract
-    past = contract.slices.get(PAST_ACTIONS, slice(0, 0))
-    count = (past.stop - past.start) // ACTION_SIZE
-    actions = np.tile(np.asarray(contract.hover_action, np.float32), (count, 1))
+    actions = np.tile(np.asarray(contract.hover_action, np.float32), (contract.past_actions, 1))
     start, local = runtime.course.memory, odometry.seen_from(runtime.course.origin)
     return RuntimeState(start, None, "", local, actions, None, began=now, slots=0, steps=0)
 
@@ -309,7 +296,7 @@ def act(
     decision = Decision(
         observation=observation,
         action=action,
-        command=runtime.low + (action.astype(np.float64) + 1) / 2 * runtime.span,  # `contract.action.mapping`
+        command=runtime.policy.contract.action.command(action),
         mode=runtime.policy.contract.action.mode,
         position=course.origin.points(np.asarray(course.goal.goal(state.task, elapsed))[0]),
         late_s=late,
@@ -364,19 +351,12 @@ def observe(
     for field in runtime.course.goal.fields:
         row[slices[field.name]] = shown[at : at + field.size]
         at += field.size
-    for name, part in slices.items():
-        if name == ATTITUDE.name:
-            row[part] = odometry.quaternion
-        elif name == VELOCITY.name:
-            row[part] = odometry.velocity
-        elif name == BODY_RATE.name:
-            row[part] = odometry.body_rate
-        elif name == PAST_ACTIONS:
-            row[part] = past_actions.ravel()
-        elif name in _IMU_FIELDS:
-            if imu is None:
-                raise ValueError(f"observation field {name!r}: there is no measurement of an IMU; accepted: an `Imu`")
-            row[part] = imu.gyroscope if name == GYROSCOPE.name else imu.accelerometer
+    known = Known(odometry, imu, past_actions)
+    for own in contract.own:
+        name = own.field.name
+        if own.source == "imu" and imu is None:
+            raise ValueError(f"observation field {name!r}: there is no measurement of an IMU; accepted: an `Imu`")
+        row[slices[name]] = own.value(known)
     return row
 
 

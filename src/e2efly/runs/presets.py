@@ -25,7 +25,6 @@ from e2efly.config.registry import is_shipped
 from e2efly.config.tables import LARGEST
 from e2efly.policy import zoo
 from e2efly.policy.loader import load_policy
-from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.policy.zoo import policy_file
 from e2efly.tasks import TASKS
 from e2efly.vehicles import posterior
@@ -249,8 +248,7 @@ def begun(config: TrainConfig) -> TrainConfig:
     file = policy_file(config.start_from, config.env.vehicle)
     contract, env = load_policy(file).contract, config.env
     if env.past_actions is None:
-        seen = sum(field.size for field in contract.observation if field.name == PAST_ACTIONS)
-        env = dataclasses.replace(env, past_actions=seen // len(contract.action.low))
+        env = dataclasses.replace(env, past_actions=contract.past_actions)
     if contract.vehicle_ranges is not None and env.command_range is None and contract.action.mode == env.command_mode:
         env = dataclasses.replace(env, command_range=contract.action.command_range)
     return dataclasses.replace(config, env=env, start_from=str(file.absolute()))

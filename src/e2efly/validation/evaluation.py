@@ -18,7 +18,6 @@ from e2efly.environment import UNSEEN, Env, random_key
 from e2efly.environment.episodes import Act, Episodes, rows, run_stepwise, summary
 from e2efly.policy.images import NONE, Image
 from e2efly.policy.loader import Policy, level_and_still, load_policy
-from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.policy.runtime import Acting
 from e2efly.policy.zoo import policy_file
 from e2efly.runs import presets
@@ -177,6 +176,7 @@ class Candidate:
             ValueError: when the policy expects a different observation or different images.
         """
         env = Env.of(suite, RewardConfig({"prog2": 1.0}), self.env, flown=None if self.draws else self.flown)
+        env = env.showing([field.name for field in self.policy.contract.observation])
         check_observation(self.policy, env)
         return env
 
@@ -278,12 +278,11 @@ def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
 def pinned(env: EnvConfig, policy: Acting) -> EnvConfig:
     """The same environment, which keeps rate, commands and past actions whatever else of it changes."""
     c = policy.contract
-    seen = {f.name: f.size for f in c.observation}
     return dataclasses.replace(
         env,
         control_rate=c.control_rate_hz,
         command_range=c.action.command_range,
-        past_actions=seen.get(PAST_ACTIONS, 0) // 4,
+        past_actions=c.past_actions,
     )
 
 
@@ -493,7 +492,6 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
             f"vehicle_hash is {trained} in the contract, but vehicle {c.vehicle!r} is {known}: it was trained "
             "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
         )
-    counts = {f.name: f.size for f in c.observation}
     latency = c.latency_range_s[0], c.latency_range_s[1]
     one = c.vehicle_ranges is not None and name != vehicle and vehicle is not None
     config = EnvConfig(
@@ -503,8 +501,8 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
         action_latency=None if one else latency,  # one vehicle of a family has its own
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         command_range=c.action.command_range,
-        past_actions=counts.get(PAST_ACTIONS, 0) // 4,
-        imu=ImuConfig(observed="gyroscope" in counts),
+        past_actions=c.past_actions,
+        imu=ImuConfig(observed=c.sees_imu),
         cameras=tuple(_camera(image) for image in c.images),
     )
     return presets.preset(c.task, "ppo").task, config

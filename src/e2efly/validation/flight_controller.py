@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
-from e2efly.validation.plant import Known
+from e2efly.validation.plant import PlantMotion
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, inertia_tensor
 
 Numbers = Sequence[float]
@@ -51,7 +51,7 @@ class FlightController:
         if self._controller is None:
             return [min(max(self._unit * f, self._low), self._high) for f in command]
         if not self._by_rates:
-            known = Known(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
+            known = PlantMotion(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
             wanted = self._controller(self._vehicle, known, (command[0], command[1], command[2], command[3]))
             command = [float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)]
         return self._loop.thrusts(command, motion[3:], dt)

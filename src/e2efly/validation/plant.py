@@ -60,7 +60,7 @@ class RigidState:
 
 
 @dataclass(frozen=True)
-class Known:
+class PlantMotion:
     """What the controllers know of the vehicle's motion."""
 
     position: Vec3

@@ -14,7 +14,7 @@ from e2efly.control.cascade import limited
 from e2efly.control.manoeuvres import DURATION, doublets, lines, softened, trimmed
 from e2efly.logs.recording import Record, Stream
 from e2efly.validation.log import motion_streams
-from e2efly.validation.plant import Delay, Known, Plant, RigidState
+from e2efly.validation.plant import Delay, Plant, PlantMotion, RigidState
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -92,7 +92,7 @@ def fly_excitation(
         if sag:
             plant.disturb(np.zeros(3), np.full(4, 1 - sag * now / seconds))
         if k % ticks == 0:
-            motion = Known(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
+            motion = PlantMotion(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
             found = wanted(steer, motion, (*lines(now, speed), 0.0))
             rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
             trim = trimmed(trim, lines(now, speed)[2] - state.velocity[2], 1 / COMMANDS, LIFT, WEAKEST)

@@ -97,8 +97,7 @@ def fly(
     if steps < 1:
         raise ValueError(f"duration is {duration} s; accepted: one control period or more, {period:.4g} s")
     disturbed = air is not None and air.disturbs
-    hover = runtime.low + (np.array(contract.hover_action) + 1) / 2 * runtime.span
-    delay = Delay.of(latency, hover)
+    delay = Delay.of(latency, contract.action.command(np.array(contract.hover_action)))
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
     samples = [] if sample is None else [FlightSample.of(plant, 0.0)]

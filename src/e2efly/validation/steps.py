@@ -15,7 +15,7 @@ from e2efly.flight.betaflight.sticks import sticks_of
 from e2efly.flight.pilot.hover import flight_gains
 from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.logs.recording import Record, Stream
-from e2efly.validation.plant import Known
+from e2efly.validation.plant import PlantMotion
 from e2efly.validation.rig import Rig
 from e2efly.validation.sitl import FirmwareState
 from e2efly.vehicles.gravity import GRAVITY
@@ -96,7 +96,7 @@ class _Hand:
     def _hover(self) -> np.ndarray:
         s, controller = self.rig.state, COMMAND_MODES["position"].controller
         assert controller is not None
-        motion = Known(Vec3(*s.position), Vec3(*s.velocity), Quat(*s.quaternion))
+        motion = PlantMotion(Vec3(*s.position), Vec3(*s.velocity), Quat(*s.quaternion))
         wanted = controller(self.steer, motion, (0.0, 0.0, HEIGHT, 0.0))
         return np.array([wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z], float)
 

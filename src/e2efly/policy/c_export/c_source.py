@@ -16,8 +16,8 @@ from e2efly.policy.c_export.header import (
     field_name,
     header,
     image_name,
+    image_parameters,
     image_size,
-    past_actions,
     sizes,
 )
 from e2efly.policy.c_export.program import CProgram, Operand, layout
@@ -75,15 +75,11 @@ def sources(contract: Contract, content: bytes, name: str, precision: Precision)
     return Sources(header(contract, name, sha256(content).hexdigest(), needs, precision), "\n".join(parts), needs)
 
 
-def _images(contract: Contract) -> str:
-    return "".join(f" const float *{image_name(image.name)}," for image in contract.images)
-
-
 def _network(c: Contract, name: str, program: CProgram, places: list[int], outputs: dict[str, Operand]) -> str:
     big = name.upper()
     lines = [
         f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
-        f"{_images(c)} float action[4])",
+        f"{image_parameters(c)} float action[4])",
         "{",
         "    real *const s = state->scratch;",
         *(f"    real *const b{i} = s + {place};" for i, place in enumerate(places) if _is_used(program, i)),
@@ -139,7 +135,7 @@ def _in_range(c: Contract, big: str) -> list[str]:
 
 
 def _around(c: Contract, name: str) -> str:
-    big, past = name.upper(), past_actions(c)
+    big, past = name.upper(), ACTION_SIZE * c.past_actions
     begin = [f"    for (int i = 0; i < {c.memory_size}; i++) state->memory[i] = 0.0f;"] if c.memory_size else []
     begin += [f"    for (int i = 0; i < {c.observation_size}; i++) state->observation[i] = 0.0f;"]
     begin += [f"    for (int i = 0; i < {past}; i++) state->past_actions[i] = hover_action[i % 4];"] if past else []
@@ -152,7 +148,7 @@ def _around(c: Contract, name: str) -> str:
         f"    for (int i = {past - 1}; i >= 4; i--) state->past_actions[i] = state->past_actions[i - 4];",
         "    for (int i = 0; i < 4; i++) state->past_actions[i] = action[i];",
     ]
-    given = "".join(f" {image_name(image.name)}," for image in c.images)
+    given, images = "".join(f" {image_name(image.name)}," for image in c.images), image_parameters(c)
     span = np.asarray(c.action.high) - np.asarray(c.action.low)
     return "\n".join(
         [
@@ -165,7 +161,7 @@ def _around(c: Contract, name: str) -> str:
             *begin,
             "}",
             "",
-            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{_images(c)} float action[4])",
+            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[4])",
             "{",
             f"    {name}_status status;",
             *copies,

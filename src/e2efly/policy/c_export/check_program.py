@@ -17,13 +17,8 @@ CLOSE: dict[Precision, float] = {"double": 1e-6, "float": 1e-5}
 
 
 def check_source(contract: Contract, content: bytes, name: str, precision: Precision) -> str:
-    """The program, with random observations and images and the exact actions for them.
-
-    Args:
-        contract: the contract of the policy.
-        content: the content of its policy.onnx.
-        name: name of the files and prefix of the symbols.
-        precision: the precision in which the network computes.
+    """The program, with random observations and images and the exact actions for them. Arguments as for
+    `e2efly.policy.c_export.c_source.sources`.
     """
     rng, exact = np.random.default_rng(0), Exact(contract, content)
     observation = random_observations(rng, contract.observation, STEPS)

@@ -38,16 +38,11 @@ class Sizes:
 
 def sizes(contract: Contract, scratch: int, constants: int, precision: Precision) -> Sizes:
     """The memory that a policy needs, from its contract, the count of scratch numbers and the bytes of constants."""
-    kept = contract.observation_size + contract.memory_size + past_actions(contract)
+    kept = contract.observation_size + contract.memory_size + ACTION_SIZE * contract.past_actions
     images = sum(image_size(image) for image in contract.images)
     width = BYTES[precision]
     state = -(-(width * max(scratch, 1) + BYTES["float"] * kept) // width) * width  # C aligns it
     return Sizes(scratch, state, BYTES["float"] * images, constants)
-
-
-def past_actions(contract: Contract) -> int:
-    """Count of numbers in the past actions that the policy sees."""
-    return sum(field.size for field in contract.observation if field.name == PAST_ACTIONS)
 
 
 def image_size(image: Image) -> int:
@@ -65,6 +60,11 @@ def image_name(name: str) -> str:
     """The name of an image in C. See `field_name`."""
     plain = _plain(name)
     return plain if plain.startswith("image_") else f"image_{plain}"
+
+
+def image_parameters(contract: Contract) -> str:
+    """The parameters of a function of C for the images."""
+    return "".join(f" const float *{image_name(image.name)}," for image in contract.images)
 
 
 def _plain(name: str) -> str:
@@ -92,15 +92,7 @@ def check_names(contract: Contract) -> None:
 
 
 def header(contract: Contract, name: str, digest: str, needs: Sizes, precision: Precision) -> str:
-    """The file NAME.h.
-
-    Args:
-        contract: the contract of the policy.
-        name: name of the file and prefix of the symbols.
-        digest: the SHA-256 of the policy.onnx.
-        needs: the memory that the policy needs.
-        precision: the precision in which the network computes.
-    """
+    """The file NAME.h. The digest is the SHA-256 of the policy.onnx; see `e2efly.policy.c_export.c_source.sources`."""
     big = name.upper()
     parts = [
         comment(f"{name}: a policy of e2efly {contract.e2efly_version} for the task {contract.task}, as C99."),
@@ -146,7 +138,7 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
     counts = {
         "OBSERVATION_SIZE": (c.observation_size, "numbers of the observation"),
         "MEMORY_SIZE": (c.memory_size, "numbers that it remembers from step to step"),
-        "PAST_ACTIONS": (past_actions(c) // ACTION_SIZE, "of its own that it sees"),
+        "PAST_ACTIONS": (c.past_actions, "of its own that it sees"),
         "STATE_BYTES": (needs.state, "of the state below"),
         "IMAGE_BYTES": (needs.images, "of the images that its caller holds"),
         "CONSTANT_BYTES": (needs.constants, "of weights and tables, beside the code"),
@@ -209,14 +201,14 @@ def _state(c: Contract, name: str, needs: Sizes, precision: Precision) -> str:
     ]
     if c.memory_size:
         lines.append(f"    float memory[{c.memory_size}];")
-    if past := past_actions(c):
-        lines.append(f"    float past_actions[{past}]; {comment('newest first')}")
+    if c.past_actions:
+        lines.append(f"    float past_actions[{ACTION_SIZE * c.past_actions}]; {comment('newest first')}")
     lines += [f"    float observation[{c.observation_size}];", f"    {name}_real scratch[{max(needs.scratch, 1)}];"]
     return "\n".join([*lines, f"}} {name}_state;\n"])
 
 
 def _calls(c: Contract, name: str) -> str:
-    big, images = name.upper(), "".join(f" const float *{image_name(image.name)}," for image in c.images)
+    big, images = name.upper(), image_parameters(c)
     low, high = c.action.limits
     commands = "; ".join(
         f"{field} {a:g} to {b:g} {unit}"

@@ -1,4 +1,8 @@
-"""A C program, step by step: its arrays, the arrays that each step reads and writes, and their place in memory."""
+"""A C program, step by step: its arrays, the arrays that each step reads and writes, and their place in memory.
+
+A public generator (emx-onnx-cgen 1.4.0) was measured on all policies of the zoo. It keeps its arrays on the stack, up
+to 44 KB, where `layout` needs 7.7 KB of the caller's state, and a step takes 1.7 times as long.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
