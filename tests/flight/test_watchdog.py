@@ -190,8 +190,8 @@ BRIDGE = """
 import json, sys, time
 from e2efly.flight.betaflight.codec import encode
 from e2efly.flight.betaflight.messages import set_raw_rc
-from e2efly.flight.betaflight.watchdog import Plan, WatchedLink
-target, sticks, plan = sys.argv[1], json.loads(sys.argv[2]), Plan(**json.loads(sys.argv[3]))
+from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
+target, sticks, plan = sys.argv[1], json.loads(sys.argv[2]), DescentPlan(**json.loads(sys.argv[3]))
 link = WatchedLink(target, 1.0)
 print(link._process.pid, flush=True)
 while not link.taken_over:
