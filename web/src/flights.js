@@ -1,70 +1,128 @@
 // Flights of the policy: episodes that are watched step by step, and whole flights as fast as the machine computes.
-import { advance, begin, observe } from "./simulation/environment.js";
-import { add } from "./simulation/vectors.js";
-import { TASKS } from "./tasks/index.js";
+import { bytesOf, machine } from "./machine.js";
 
 /** Speed, m/s, and body rate, rad/s, that a throw adds to each axis at most. */
 const THROW = { velocity: 2.5, rate: 6 };
+const VEHICLE = "vehicle.";
+const WHY = "why.";
 
-/** @typedef {import("./simulation/environment.js").World} World */
-/** @typedef {import("./simulation/environment.js").Outcome} Outcome */
-/** @typedef {import("./simulation/environment.js").Conditions} Conditions */
-/** @typedef {import("./policy.js").Act} Act */
+/** @typedef {{wind: number[], mass: number, thrust: number, delay: number}} Conditions
+ * Velocity of the air in the world, m/s; mass and thrust relative to the vehicle's file; s from an observation to its
+ * command. */
+/** @typedef {{course: any, start: any, state: Record<string, number[]>, vehicle: Record<string, number[]>,
+ *   time: number, goal: number[], observation: number[]}} World One vehicle and its task between two actions. */
+/** @typedef {{terminated: boolean, truncated: boolean, success: boolean, arrived: boolean, crashed: boolean,
+ *   error: number, signals: string[]}} Outcome What a control step came to; what else the task says is true. */
+/** @typedef {(observation: number[], memory: number[]) => {action: number[], memory: number[]}} Act */
 
 /** @typedef {object} Episode A flight that is watched.
  * @property {World} world now
  * @property {World} before a control step ago: what is drawn lies between the two
- * @property {Float32Array} memory the policy's
+ * @property {number[]} memory the policy's
+ * @property {number} arrivals how many goals were reached
  * @property {Outcome | null} outcome of the last step
- * @property {Outcome | null} verdict the outcome that ended the episode
- * @property {number | null} over seconds since nothing moves any more; null: the vehicle flies */
+ * @property {Outcome | null} verdict the outcome that ended the episode; of its signals, those that became true then
+ * @property {number} over seconds since it ended
+ * @property {boolean} still whether nothing moves any more */
+
+/** @type {WeakMap<any, import("./machine.js").Run>} */
+const prepared = new WeakMap();
+
+/** @type {(program: import("./machine.js").Program, given: Record<string, number[]>) => Record<string, number[]>} */
+function run(program, given) {
+  let ready = prepared.get(program);
+  if (!ready) prepared.set(program, (ready = machine(program)));
+  return ready(given);
+}
+
+/** The policy of a page. @type {(flight: any) => Act} */
+export const policyOf = (flight) => (observation, memory) => {
+  const found = run(flight.policy, flight.memory_size ? { observation, memory } : { observation });
+  return { action: found.action, memory: found.next_memory ?? memory };
+};
+
+/** @type {(course: any, start: any, state: Record<string, number[]>) => World} */
+function worldOf(course, start, state) {
+  const own = Object.entries(state).filter(([name]) => name.startsWith(VEHICLE));
+  const vehicle = Object.fromEntries(own.map(([name, numbers]) => [name.slice(VEHICLE.length), numbers]));
+  const { observation, goal } = run(course.look, state);
+  return { course, start, state, vehicle, time: state.time[0], goal, observation };
+}
+
+/** A world that begins. @type {(flight: any, course: number, start: number) => World} */
+function begun(flight, course, start) {
+  const { [course]: where } = flight.courses;
+  const { [start % where.starts.length]: from } = where.starts;
+  const packed = /** @type {[string, string][]} */ (Object.entries(from.state));
+  const numbers = packed.map(([name, text]) => [name, Array.from(new Float64Array(bytesOf(text)))]);
+  return worldOf(where, from, Object.fromEntries(numbers));
+}
 
 /** The beginning of an episode. @type {(flight: any, course: number, start: number) => Episode} */
 export function episodeOf(flight, course, start) {
-  const { starts } = flight.courses[course];
-  const world = begin(flight, flight.courses[course], starts[start % starts.length]);
-  const memory = new Float32Array(flight.memory_size);
-  return { world, before: world, memory, outcome: null, verdict: null, over: null };
+  const world = begun(flight, course, start);
+  const memory = Array(flight.memory_size).fill(0);
+  return { world, before: world, memory, arrivals: 0, outcome: null, verdict: null, over: 0, still: false };
 }
 
 /** The same, pushed and spun at random. @type {(episode: Episode) => Episode} */
 export function thrown(episode) {
-  const random = (/** @type {number} */ most) => [0, 0, 0].map(() => most * (2 * Math.random() - 1));
-  const { vehicle } = episode.world;
-  const velocity = add(vehicle.velocity, random(THROW.velocity));
-  const body_rate = add(vehicle.body_rate, random(THROW.rate));
-  return { ...episode, world: { ...episode.world, vehicle: { ...vehicle, velocity, body_rate } } };
+  const { course, start, state } = episode.world;
+  const pushed = (/** @type {number} */ most) => (/** @type {number} */ x) => x + most * (2 * Math.random() - 1);
+  const velocity = state["vehicle.velocity"].map(pushed(THROW.velocity));
+  const rate = state["vehicle.body_rate"].map(pushed(THROW.rate));
+  const after = { ...state, "vehicle.velocity": velocity, "vehicle.body_rate": rate };
+  return { ...episode, world: worldOf(course, start, after) };
 }
 
-/** A control step later. @type {(episode: Episode, act: Act, conditions: Conditions) => Promise<Episode>} */
-export async function stepped(episode, act, conditions) {
-  const period = episode.world.flight.physics.control_period;
-  if (episode.over !== null) return { ...episode, before: episode.world, over: episode.over + period };
-  const { action, memory } = await act(observe(episode.world), episode.memory);
+/** One control step under an action in [-1, 1].
+ * @type {(world: World, action: number[], conditions: Conditions) => {world: World, outcome: Outcome}} */
+function advance(world, action, conditions) {
+  const hands = Object.entries(conditions).map(([name, value]) => [`hands.${name}`, [value].flat()]);
+  const found = run(world.course.step, { ...world.state, ...Object.fromEntries(hands), action });
+  const [terminated, truncated, success, arrived, crashed] = [
+    found.terminated, found.truncated, found.success, found.arrived, found.crashed,
+  ].map(([yes]) => yes !== 0);
+  const raised = Object.keys(found).filter((name) => name.startsWith(WHY) && found[name][0]);
+  const signals = raised.map((name) => name.slice(WHY.length));
+  const reached = Object.fromEntries(Object.keys(world.state).map((name) => [name, found[name]]));
+  const outcome = { terminated, truncated, success, arrived, crashed, error: found.error[0], signals };
+  return { world: worldOf(world.course, world.start, reached), outcome };
+}
+
+/** A control step later. After its end the vehicle flies on, unless it crashed or has nothing more to fly.
+ * @type {(episode: Episode, act: Act, conditions: Conditions) => Episode} */
+export function stepped(episode, act, conditions) {
+  const { period } = episode.world.course;
+  const over = episode.verdict === null ? 0 : episode.over + period;
+  if (episode.still) return { ...episode, before: episode.world, over };
+  const { action, memory } = act(episode.world.observation, episode.memory);
   const { world, outcome } = advance(episode.world, action, conditions);
-  const timedOut = world.time >= world.course.task.config.episode_s - 1e-3 * period;
-  const ends = outcome.terminated || timedOut;
-  const first = ends && episode.verdict === null;
-  const verdict = first || outcome.crashed ? outcome : episode.verdict;
-  const stops = outcome.crashed || (first && !(outcome.success && TASKS[world.course.kind].goesOn));
-  return { world, before: episode.world, memory, outcome, verdict, over: stops ? 0 : null };
+  const first = episode.verdict === null && (outcome.terminated || outcome.truncated);
+  const signals = outcome.signals.filter((name) => !episode.outcome?.signals.includes(name));
+  const verdict = first ? { ...outcome, signals } : episode.verdict;
+  const still = outcome.crashed || (outcome.terminated && !first);
+  const arrivals = episode.arrivals + Number(outcome.arrived);
+  return { world, before: episode.world, memory, arrivals, outcome, verdict, over, still };
 }
 
 /** Fly from a start for some seconds, whatever happens on the way.
  * @param {any} flight
  * @param {Act} act
  * @param {{course?: number, start?: number, seconds: number, conditions: Conditions}} options
- * @returns {Promise<any[]>} each control step: time, state, observation, action and outcome */
-export async function fly(flight, act, { course = 0, start = 0, seconds, conditions }) {
-  let { world, memory } = episodeOf(flight, course, start);
+ * @returns {any[]} each control step: time, state, observation, action and outcome */
+export function fly(flight, act, { course = 0, start = 0, seconds, conditions }) {
+  let world = begun(flight, course, start);
+  let memory = Array(flight.memory_size).fill(0);
   const rows = [];
-  for (let i = 0; i < Math.round(seconds / flight.physics.control_period); i++) {
-    const observation = observe(world);
-    const asked = await act(observation, memory);
+  for (let i = 0; i < Math.round(seconds / world.course.period); i++) {
+    const { observation } = world;
+    const asked = act(observation, memory);
     const reached = advance(world, asked.action, conditions);
     world = reached.world;
     memory = asked.memory;
-    rows.push({ time: world.time, ...world.vehicle, observation, action: asked.action, ...reached.outcome });
+    const { signals, ...judged } = reached.outcome;
+    rows.push({ time: world.time, ...world.vehicle, observation, action: asked.action, ...judged });
   }
   return rows;
 }

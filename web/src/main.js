@@ -1,6 +1,6 @@
 // The page: loads the policy, flies it, shows it.
-import { episodeOf, fly, stepped, thrown } from "./flights.js";
-import { loadPolicy } from "./policy.js";
+import { episodeOf, fly, policyOf, stepped, thrown } from "./flights.js";
+import { machine } from "./machine.js";
 import { conditionsOf, describe, element, report, resetSliders, showSliders } from "./view/panel.js";
 import { Show } from "./view/show.js";
 
@@ -9,18 +9,19 @@ const LONGEST = 0.1;
 /** How long the end of an episode is shown before the next begins, s. */
 const SHOWN = 2.5;
 
-const { e2eflyFlight: flight, e2eflyPolicy: policy, e2eflyRuntime: runtime } = /** @type {any} */ (globalThis);
-const period = flight.physics.control_period;
+const { e2eflyFlight: flight } = /** @type {any} */ (globalThis);
 
-/** Load everything, begin the show, and offer the page's own interface. */
+/** Begin the show, and offer the page's own interface. */
 async function begin() {
   describe(flight);
-  const act = await loadPolicy(runtime, policy, flight.memory_size);
+  const act = policyOf(flight);
   const show = showOf();
   let start = 0;
   let paused = new URLSearchParams(location.search).has("paused");
-  let camera = element("camera").value;
   let episode = episodeOf(flight, 0, 0);
+  // a long course is more than what a screen shows of a vehicle of its size
+  element("camera").value = show?.isLong(episode.world) ? "follow" : "orbit";
+  let camera = element("camera").value;
 
   const restart = () => {
     start += 1;
@@ -32,7 +33,7 @@ async function begin() {
     element("pause").textContent = paused ? "Go on" : "Pause";
   };
   const toss = () => {
-    if (episode.over === null) episode = thrown(episode);
+    if (!episode.still) episode = thrown(episode);
   };
   const look = () => {
     camera = element("camera").value;
@@ -59,22 +60,20 @@ async function begin() {
   show?.look(camera, episode.world);
   let last = performance.now();
   let ahead = 0;
-  const picture = async () => {
+  const picture = () => {
     const now = performance.now();
     const dt = Math.min((now - last) / 1e3, LONGEST);
     last = now;
     ahead += paused ? 0 : dt;
     const conditions = conditionsOf(flight);
+    const { period } = episode.world.course;
     for (; ahead >= period; ahead -= period) {
-      const asked = episode;
-      const reached = await stepped(asked, act, conditions);
-      if (episode !== asked) continue; // begun anew or thrown while the policy was asked
-      episode = reached;
-      if (episode.over === null) show?.reached(episode.before);
-      else if (episode.over > SHOWN) restart();
+      episode = stepped(episode, act, conditions);
+      if (!episode.still) show?.reached(episode.before);
+      if (episode.over > SHOWN) restart();
     }
     report(episode, paused);
-    const moves = !paused && episode.over === null;
+    const moves = !paused && !episode.still;
     show?.draw(episode.before, episode.world, ahead / period, { dt, wind: conditions.wind, camera, moves });
     requestAnimationFrame(picture);
   };
@@ -83,18 +82,21 @@ async function begin() {
 
   return {
     flight,
-    act: (/** @type {number[]} */ observation, /** @type {number[]} */ memory) =>
-      act(observation, Float32Array.from(memory)),
-    fly: (/** @type {any} */ { actions, numbers = flight, ...options }) =>
-      fly(numbers, actions ? scripted(actions) : act, { conditions: conditionsOf(numbers), ...options }),
+    act,
+    machine,
+    fly: (/** @type {any} */ { actions, numbers = flight, conditions = {}, ...options }) =>
+      fly(numbers, actions ? scripted(actions) : act, {
+        ...options,
+        conditions: { ...conditionsOf(numbers), ...conditions },
+      }),
     now: () => ({ time: episode.world.time, ...episode.world.vehicle, verdict: episode.verdict }),
   };
 }
 
-/** What acts as a policy whose actions are given. @type {(actions: number[][]) => import("./policy.js").Act} */
+/** What acts as a policy whose actions are given. @type {(actions: number[][]) => import("./flights.js").Act} */
 function scripted(actions) {
   const rest = actions.values();
-  return async (_, memory) => ({ action: rest.next().value ?? actions[actions.length - 1], memory });
+  return (_, memory) => ({ action: rest.next().value ?? actions[actions.length - 1], memory });
 }
 
 /** What draws; null where the browser has no WebGL: then there are figures alone. */

@@ -228,6 +228,10 @@ class Env:
         """Duration of a control step, s."""
         return self.physics.control_period
 
+    def is_over(self, time: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Whether the time of an episode is over, at a time since its start, s."""
+        return time >= self.task.episode_s - 1e-3 * self.control_period
+
     def command(self, action: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
         """The nominal action map: linear from [-1, 1] to the command's range, and clipped to it."""
         return self.center + self.half * jnp.clip(action, -1.0, 1.0)
@@ -324,7 +328,7 @@ class Env:
         after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
 
         time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
-        late = time >= self.task.episode_s - 1e-3 * period
+        late = self.is_over(time)
         memory, outcome = self.task.advance(state.memory, before, after, time, late)
         inertial = state.imu
         if self.imu is not None and inertial is not None:

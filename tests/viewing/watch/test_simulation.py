@@ -8,6 +8,7 @@ import pytest
 
 from e2efly.environment import Env, random_key
 from e2efly.validation.evaluation import act_of, candidate
+from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.simulation import Hands, Simulation, held, under
 
 
@@ -61,6 +62,15 @@ def test_a_heavier_vehicle_is_also_harder_to_turn(hover: Simulation) -> None:
     assert np.allclose(heavy.plant["inertia"], 2 * np.asarray(env.physics.nominal.inertia))
     assert np.allclose(heavy.action_latency, 0.1)
     assert np.allclose(heavy.wind, [1.0, 2.0, 0.0])
+
+
+def test_the_mass_is_relative_to_the_vehicle_that_flies(hover: Simulation) -> None:
+    """Not to the one for which its flight controller is tuned."""
+    other = replace(hover.env, physics=hover.env.physics.flying(load_vehicle("vis_h")))
+    state, _ = other.reset(random_key(0), 2)
+    told = under(other, state, Hands(mass=1.0, thrust=1.0))
+    for name in ("mass", "inertia", "thrust_map"):
+        np.testing.assert_allclose(told.plant[name], state.plant[name], rtol=1e-6, err_msg=name)
 
 
 def test_a_moved_goal_is_flown_to(hover: Simulation) -> None:

@@ -1,18 +1,12 @@
 """What an exported page consists of, and what is refused."""
 
-import dataclasses
 import hashlib
 from pathlib import Path
 
-import jax
 import pytest
 
 from e2efly.commands.cli import run
-from e2efly.config import RewardConfig
-from e2efly.environment import Env
-from e2efly.tasks.hover import HoverConfig
-from e2efly.tasks.hover.world import Hover
-from e2efly.viewing.web.page import ASSETS, COPIED, RUNTIME, numbers
+from e2efly.viewing.web.page import ASSETS, COPIED
 
 ROOT = Path(__file__).parents[3]
 SOURCES = ("build.js", "package-lock.json", "package.json")
@@ -38,12 +32,12 @@ def test_a_page_is_small_and_needs_no_server(tmp_path: Path, capsys: pytest.Capt
     assert run(["export", "race", "--web", str(tmp_path / "a" / "page")]) == 0
     assert "index.html" in capsys.readouterr().out
     files = {path.name: path for path in (tmp_path / "a" / "page").iterdir()}
-    assert set(files) == {*COPIED, "runtime.js", "policy.js", "flight.js"}
-    assert sum(path.stat().st_size for name, path in files.items() if name != "runtime.js") < 5_000_000
+    assert set(files) == {*COPIED, "flight.js"}
+    assert files["page.js"].stat().st_size < 1_000_000
+    assert sum(path.stat().st_size for path in files.values()) < 1_500_000
     index = files["index.html"].read_text()
     assert "http" not in index
     assert 'type="module"' not in index  # browsers refuse modules from file://
-    assert (ASSETS / RUNTIME).stat().st_size < 5_000_000
 
 
 @pytest.mark.parametrize(
@@ -62,19 +56,6 @@ def test_what_no_page_can_fly_is_refused(
     told = " ".join(capsys.readouterr().err.split())
     assert message in told
     assert not (tmp_path / "page").exists()
-
-
-def test_a_task_that_extends_another_is_not_taken_for_it() -> None:
-    env = Env.of(HoverConfig(), RewardConfig({"prog2": 1.0}))
-    env = dataclasses.replace(env, task=Swaying(env.task.config, env.task.shape, env.control_period))
-    with pytest.raises(ValueError, match=r"Swaying, which the page does not simulate; accepted: .*hover.*land.*race"):
-        numbers({"sway": env})
-
-
-@jax.tree_util.register_dataclass
-@dataclasses.dataclass(frozen=True)
-class Swaying(Hover):
-    """A world of one's own."""
 
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

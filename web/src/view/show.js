@@ -6,6 +6,9 @@ import { Stage } from "./stage.js";
 import { Streaks, Trail } from "./streaks.js";
 import { between, Vehicle } from "./vehicle.js";
 
+/** Length of a course, m, from which on the camera follows the vehicle at first. */
+const LONG = 10;
+
 /** Take things out of the scene, and their memory from the graphics card. @type {(things: THREE.Object3D) => void} */
 function discard(things) {
   things.removeFromParent();
@@ -34,7 +37,7 @@ export class Show {
       if (part) discard(part);
     }
     this.stage.paint(colour);
-    this.vehicle = new Vehicle(this.flight.physics.body, colour);
+    this.vehicle = new Vehicle(this.flight.courses[0].vehicle, colour);
     this.trail = new Trail(colour);
     this.streaks = new Streaks(colour);
     this.course = null;
@@ -53,6 +56,11 @@ export class Show {
     this.stage.stale = true;
   }
 
+  /** @param {any} world @returns {boolean} whether its course is long */
+  isLong(world) {
+    return extent(world).getSize(new THREE.Vector3()).length() > LONG;
+  }
+
   /** @param {any} world that the drawn vehicle leaves behind it */
   reached(world) {
     this.trail?.add(world.vehicle.position);
@@ -66,7 +74,7 @@ export class Show {
     if (!this.course) this.begin(this.drawn ?? world);
     const state = between(before.vehicle, world.vehicle, share);
     this.vehicle?.place(state, moves ? dt : 0);
-    this.course?.update({ ...world, vehicle: state });
+    this.course?.update(world);
     const [w, x, y, z] = state.quaternion;
     const place = new THREE.Vector3(state.position[0], state.position[1], state.position[2]);
     this.streaks?.move(wind, state.position, moves ? dt : 0);

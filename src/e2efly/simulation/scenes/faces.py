@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from e2efly.courses.solids import DISC, SQUARE
+from e2efly.courses.solids import CLASSES, DISC, SQUARE
 from e2efly.simulation.physics.rotation import to_matrix
 from e2efly.simulation.scenes.scene import WALL, Scene
 
@@ -28,6 +28,8 @@ class FacesBody:
     """Path of its centre during one round, world, m. None: it does not move."""
     rate: float = 0.0
     """Angular rate on this path, rad/s."""
+    label: str = "obstacle"
+    """Its semantic class, a name of `solids.CLASSES`."""
 
     def moved(self, time: float) -> Float[np.ndarray, "3"]:
         """Displacement since time 0, m, at a time, s."""
@@ -72,7 +74,8 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             angle = np.append(rate[i] * time, np.linspace(0, 2 * np.pi, 49))[:, None]
             way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
             moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
-            found.append(FacesBody(quads + way[0], colour[i], way[1:] if moves else None, float(rate[i])))
+            path = way[1:] if moves else None
+            found.append(FacesBody(quads + way[0], colour[i], path, float(rate[i]), CLASSES[label[i]]))
     return found
 
 

@@ -3,7 +3,6 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -29,9 +28,6 @@ jax.tree_util.register_dataclass(GapMemory)
 @dataclass(frozen=True)
 class Gap(GapGoal):
     """Make it with `Gap.of`."""
-
-    page: ClassVar = "gap"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @classmethod
     def of(cls, config: GapConfig, shape: Shape, control_period: float, checks: int = 1) -> "Gap":

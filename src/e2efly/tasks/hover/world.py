@@ -2,7 +2,6 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -19,9 +18,6 @@ from e2efly.tasks.task import at_rest, uniform
 @dataclass(frozen=True)
 class Hover(HoverGoal):
     """Starts around the target, over level ground."""
-
-    page: ClassVar = "hover"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, " n"]]:
         """Uniform around the target: position, velocity, roll, pitch, any yaw, body rates."""

@@ -2,7 +2,6 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -23,9 +22,6 @@ jax.tree_util.register_dataclass(HoverAwareMemory)
 @dataclass(frozen=True)
 class HoverAware(HoverAwareGoal):
     """Starts around the target, with a ball on a circle around it."""
-
-    page: ClassVar = "hover_aware"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, HoverAwareMemory]:
         """Uniform around the target: position, velocity, roll, pitch, any yaw.

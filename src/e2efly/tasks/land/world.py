@@ -2,7 +2,6 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -20,9 +19,6 @@ from e2efly.tasks.task import at_rest, uniform
 @dataclass(frozen=True)
 class Land(LandGoal):
     """Starts above and beside a flat pad."""
-
-    page: ClassVar = "land"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, "n 0"]]:
         """Level, any heading, above and beside the pad."""

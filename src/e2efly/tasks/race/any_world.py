@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,8 +33,6 @@ jax.tree_util.register_dataclass(AnyRaceMemory, data_fields=["tracks", "passed"]
 class AnyRace(AnyRaceGoal):
     """Make it with `AnyRace.of`."""
 
-    page: ClassVar = "any_race"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
     given: Tracks | None
     """The track of every episode (n = 1). None: each episode has another track."""
 

@@ -3,7 +3,6 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -25,9 +24,6 @@ from e2efly.tasks.race.way import NextGates
 @dataclass(frozen=True)
 class Race(RaceGoal):
     """Make it with `Race.of`."""
-
-    page: ClassVar = "race"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
 
     @classmethod
     def of(cls, config: RaceConfig, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "Race | AnyRace":

@@ -3,7 +3,6 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -29,8 +28,6 @@ jax.tree_util.register_dataclass(TrackMemory)
 class Track(TrackGoal):
     """Follow a reference. Make it with `Track.of`."""
 
-    page: ClassVar = "track"
-    """Name of this world on the page of `e2efly export --web`, which simulates it."""
     knots: int
     curve: Lissajous | Spline | None
     """The reference: a curve, the spline of the user's file, or None for random polynomials."""

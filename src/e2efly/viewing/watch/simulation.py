@@ -78,11 +78,11 @@ def under(env: Env, state: EnvState, hands: Hands) -> EnvState:
         wanted = jnp.broadcast_to(jnp.asarray(wanted, own.dtype), own.shape)
         return jnp.where(jnp.isnan(wanted), own, wanted)
 
-    nominal = env.physics.nominal
+    flown = env.physics.flown
     n = state.time.shape[0]
     plant = dict(state.plant)
     for name, factor in (("mass", hands.mass), ("inertia", hands.mass), ("thrust_map", hands.thrust)):
-        value = jnp.asarray(getattr(nominal, name), plant[name].dtype)
+        value = jnp.asarray(getattr(flown, name), plant[name].dtype)
         plant[name] = chosen(plant[name], jnp.broadcast_to(value, plant[name].shape) * factor)
     assert state.wind is not None
     wind = chosen(state.wind, jnp.broadcast_to(hands.wind, (n, 3)))
