@@ -35,13 +35,13 @@ from e2efly.environment import UNSEEN, Env, random_key  # noqa: E402
 from e2efly.environment.episodes import Act, Episodes, run_episodes, run_stepwise, wilson  # noqa: E402
 from e2efly.learning.judge import judge, score  # noqa: E402
 from e2efly.learning.networks import Actor, Weights  # noqa: E402
+from e2efly.learning.point import weights_of  # noqa: E402
 from e2efly.learning.programs import Programs, acting  # noqa: E402
-from e2efly.learning.runner import policy_of  # noqa: E402
 from e2efly.learning.setup import Setup  # noqa: E402
 from e2efly.learning.warm_start import started_from  # noqa: E402
 from e2efly.policy.zoo import policy_file  # noqa: E402
 from e2efly.runs import presets  # noqa: E402
-from e2efly.validation.evaluation import act_of, candidate, episode_steps, evaluate  # noqa: E402
+from e2efly.validation.evaluation import act_of, candidate, evaluate  # noqa: E402
 
 STARTS = 100
 """Of a track, where times are compared."""
@@ -134,9 +134,9 @@ def specialists(policy: str, tracks: Tracks) -> Iterator[tuple[Weights, Setup, f
         state, best, highest = programs.begin(env, first, random_key(world)), first.policy, -math.inf
         for update in range(0, setup.updates, config.chunk):
             state, _ = programs.chunk(env, config.algo, state, update, setup.updates)
-            flown = judge(setup, programs.evaluate, policy_of(state), 1, config.eval_episodes, judges)
+            flown = judge(programs.evaluate, config.eval_episodes, weights_of(state), 1, config.eval_episodes, judges)
             if (now := score(config.task, flown)) > highest:
-                best, highest = policy_of(state), now
+                best, highest = weights_of(state), now
         yield best, setup, time.perf_counter() - began
 
 
@@ -145,7 +145,7 @@ def beside(policy: str, tracks: Tracks) -> list[dict[str, Any]]:
     found = candidate(policy, task={"track": track_names()[0]})
     (suite,) = found.task.criteria().values()
     env = found.environment(suite)
-    steps, key = episode_steps(suite, env), random_key(0, UNSEEN, 0)
+    steps, key = env.episode_steps, random_key(0, UNSEEN, 0)
     ours = flier(act_of(found.policy), STARTS, steps)
     rows = []
 
@@ -217,7 +217,7 @@ def flights(policy: str) -> list[dict[str, Any]]:
     single = candidate(policy, task={"track": track_names()[0]})
     (suite,) = single.task.criteria().values()
     env, rng = single.environment(suite), np.random.default_rng(0)
-    fly = flier(act_of(single.policy), FEW, episode_steps(suite, env))
+    fly = flier(act_of(single.policy), FEW, env.episode_steps)
     each = [fly(on(env, Tracks.of(elsewhere(rng), MOST)), random_key(i, UNSEEN)) for i in range(100)]
     rows.append(told("of another sampler", jax.tree.map(lambda *x: np.concatenate(x), *each), len(each)))
     print(rows[-1], flush=True)

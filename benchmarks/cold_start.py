@@ -43,7 +43,7 @@ def watched(arguments: list[str]) -> dict[str, float]:
             seconds[part] += time.perf_counter() - began - (sum(seconds[other] for other in less) - before)
             return out
 
-        setattr(module, name, staticmethod(timed) if isinstance(module, type) else timed)
+        setattr(module, name, timed)
 
     import e2efly.learning.runner as runner
     from e2efly.commands.cli import run
@@ -76,7 +76,7 @@ def watched(arguments: list[str]) -> dict[str, float]:
     runner.Programs.compile = staticmethod(compile_all)  # type: ignore[method-assign]
     around(onnx_export, "export_policy", "export")
     around(evaluation_plots, "plot_run", "plots")
-    around(runner, "_finish", "report", ("export",))
+    around(runner._Training, "finish", "report", ("export",))
     judge = runner.judge
 
     def judged(*args: Any, **kwargs: Any) -> Any:
@@ -84,7 +84,7 @@ def watched(arguments: list[str]) -> dict[str, float]:
         seconds["evaluating"] += (time.perf_counter() - began) * looping
         return out
 
-    looping, loop = 0.0, runner._loop
+    looping, loop = 0.0, runner._Training.loop
 
     def looped(*args: Any, **kwargs: Any) -> Any:
         nonlocal looping
@@ -94,7 +94,7 @@ def watched(arguments: list[str]) -> dict[str, float]:
         seconds["learning"] = time.perf_counter() - began - seconds["evaluating"]
         return out
 
-    runner.judge, runner._loop = judged, looped
+    runner.judge, runner._Training.loop = judged, looped  # type: ignore[method-assign]
     status = run(arguments)
     if status:
         raise SystemExit(status)

@@ -19,7 +19,7 @@ from e2efly.commands.terminal import markdown
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
 from e2efly.config.storage import write_json
-from e2efly.runs.rundir import fingerprint
+from e2efly.runs.inputs import fingerprint
 from e2efly.simulation.device import processor
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the fault laboratory is the tests'

@@ -36,7 +36,7 @@ from e2efly.simulation.device import prepare
 from e2efly.simulation.physics.body import hover_rotor_speed
 from e2efly.simulation.physics.rotation import from_euler, multiply, yaw
 from e2efly.tasks.hover import HoverConfig
-from e2efly.validation.evaluation import act_of, candidate, episode_steps
+from e2efly.validation.evaluation import act_of, candidate
 from e2efly.vehicles.family import DRAWN, load_family
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -103,7 +103,7 @@ def fly(env: Env, act_for: Callable[[Any], Act], drawn: np.ndarray, task: HoverC
     parts = []
     for i in range(0, len(drawn), BATCH):
         u = drawn[i : i + BATCH].astype(np.float32)
-        key, steps = random_key(SEED, UNSEEN, i), episode_steps(task, env)
+        key, steps = random_key(SEED, UNSEEN, i), env.episode_steps
         parts.append(run_stepwise(env, act_for(u), key, BATCH, steps, altered=partial(altered, u))[0])
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 

@@ -48,7 +48,8 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import is_sealed
 from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
 from e2efly.runs import presets
-from e2efly.runs.rundir import RunDirectory, to_json
+from e2efly.runs.inputs import to_json
+from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import candidate
 from e2efly.vehicles.family import family_names

@@ -14,7 +14,7 @@ from typing import Any
 from e2efly.commands.terminal import markdown
 from e2efly.commands.train import parse
 from e2efly.config import EnvConfig
-from e2efly.runs.rundir import fingerprint
+from e2efly.runs.inputs import fingerprint
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"

@@ -16,7 +16,7 @@ from e2efly.config.env import FILE, STILL
 from e2efly.config.storage import read_json
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.zoo import USUAL, config_file, contents, policy_file
-from e2efly.runs.rundir import from_json
+from e2efly.runs.inputs import from_json
 from e2efly.vehicles.family import load_family
 
 DOCS = Path(__file__).parent

@@ -23,7 +23,7 @@ from e2efly.environment import UNSEEN, Env, random_key
 from e2efly.environment.episodes import Act
 from e2efly.policy.zoo import USUAL, contents, curve_file, policy_file
 from e2efly.simulation.device import prepare
-from e2efly.validation.evaluation import SEED, act_of, candidate, episode_steps
+from e2efly.validation.evaluation import SEED, act_of, candidate
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.space import plot_flights
 from e2efly.viewing.style import CYCLE, figure
@@ -114,7 +114,7 @@ def main() -> None:
         suite = next(iter(found.task.criteria().values()))
         env, act = found.environment(suite), act_of(found.policy)
         n = SEEN if env.cameras else EPISODES
-        flights = fly(env, act, key, n, episode_steps(suite, env))
+        flights = fly(env, act, key, n, env.episode_steps)
         title = f"{found.policy.contract.task} on {found.policy.contract.vehicle}"
         picture(flights, suite, env, key, FOLDER / f"{vehicle}-{task}.png", title)
         if vehicle == USUAL:

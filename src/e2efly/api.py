@@ -34,14 +34,18 @@ def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None
     Raises:
         ValueError: for an unknown name. The message gives the nearest name and all known names.
     """
+    return _starting(task, algo, name)
+
+
+def _starting(task: TaskLike, algo: AlgoLike | None, name: str | None, *given: str | None) -> TrainConfig:
+    """`presets.starting` for names, classes or an instance of task options. `given`: the vehicle and `start_from`."""
     options = task if isinstance(task, TaskConfig) else None
     if not isinstance(task, str):
         task = TASKS.reference(type(task) if isinstance(task, TaskConfig) else task)
-    kind = TASKS.find(task)
-    algo = algo or kind.best
-    algo = algo if isinstance(algo, str) else ALGORITHMS.reference(algo)
-    usual = presets.default(kind, ALGORITHMS.find(algo), lambda option: getattr(options, option, None))
-    config = presets.preset(task, algo, usual if name is None else name)
+    if isinstance(algo, type):
+        algo = ALGORITHMS.reference(algo)
+    algo, name = presets.completed(task, algo, name, lambda option: getattr(options, option, None))
+    config = presets.starting(task, algo, name, *given)
     return config if options is None else dataclasses.replace(config, task=options)
 
 
@@ -90,28 +94,23 @@ def train(
         ValueError: naming the field, the value and what is accepted.
         FloatingPointError: when a loss is not finite. The previous checkpoint is kept.
     """
-    config = preset(task, algo, preset_name)
-    config = config if start_from is None else presets.gentle(config)
-    if vehicle is not None:
-        config = presets.for_vehicle(config, vehicle)
-        env = env and dataclasses.replace(env, vehicle=vehicle)
+    config = _starting(task, algo, preset_name, vehicle, None if start_from is None else os.fspath(start_from))
+    env = env if env is None or vehicle is None else dataclasses.replace(env, vehicle=vehicle)
     given = {"env": env, "network": network, "algo": options} | changes
     if reward is not None:
         given["reward"] = reward if isinstance(reward, RewardConfig) else RewardConfig(reward, config.reward.parameters)
-    config = dataclasses.replace(config, **{name: value for name, value in given.items() if value is not None})
-    if start_from is not None:
-        config = dataclasses.replace(config, start_from=os.fspath(start_from))
-    config = presets.begun(config)
+    given = {name: value for name, value in given.items() if value is not None}
+    config = presets.begun(dataclasses.replace(config, **given))
     prepare(device)
     from e2efly.commands.terminal import Terminal, TerminalProgress
-    from e2efly.learning.programs import traced_folder
     from e2efly.learning.runner import train as run
-    from e2efly.runs.rundir import run_folder
+    from e2efly.learning.setup import Setup
+    from e2efly.runs.rundir import RunDirectory, run_folder
 
-    folder = run_folder(config) if out is None else Path(out)
+    setup, folder = Setup.of(config), RunDirectory(run_folder(config) if out is None else Path(out))
     title = f"{config.task.name} by {config.algo.name}"
     with TerminalProgress(Terminal(quiet=not progress), title) as reporter:
-        return run(config, folder, reporter, resume, overwrite, traced=traced_folder(config))
+        return run(setup, folder, reporter, resume, overwrite, traced=True)
 
 
 def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any:

@@ -83,6 +83,13 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             ["train", "hover", "--task.hold-s", "100"],
             "task.hold_s is 100.0; accepted: 0 to the 8 s of task.episode_s",
         ),
+        *(
+            (
+                ["train", "hover", "--env.control-rate", "5e3", f"--task.{name.replace('_', '-')}", "9000"],
+                f"task.{name} is 9000.0; accepted: at most 3355.44 s, as far as float32 counts the control steps",
+            )
+            for name in ("episode_s", "judged_s")
+        ),
         (
             ["train", "avoid", "--task.forest.density", "0.2"],
             "task.forest.room is 64; accepted: 128 or more, the trees",

@@ -2,11 +2,11 @@
 
 import dataclasses
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from e2efly.config import TrainConfig
 from e2efly.learning import runner
+from e2efly.learning.setup import Setup
+from e2efly.runs.rundir import RunDirectory
 from e2efly.validation import evaluation, starts, stress
 
 STARTS = 50
@@ -23,8 +23,9 @@ def shorten(patch: Callable[[Any, str, Any], None] = setattr) -> None:
     """
     usual = runner.train
 
-    def train(config: TrainConfig, out: Path, *args: Any, **options: Any) -> dict[str, Any]:
-        return usual(dataclasses.replace(config, steps=1, chunk=1, eval_episodes=STARTS), out, *args, **options)
+    def train(setup: Setup, run: RunDirectory, *args: Any, **options: Any) -> dict[str, Any]:
+        short = dataclasses.replace(setup.config, steps=1, chunk=1, eval_episodes=STARTS)
+        return usual(Setup.of(short), run, *args, **options)
 
     patch(runner, "train", train)
     patch(runner, "REPORT_EPISODES", STARTS)

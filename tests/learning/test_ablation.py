@@ -11,6 +11,7 @@ from e2efly.commands.cli import run
 from e2efly.config import TrainConfig
 from e2efly.learning.ablation import FULL, KeptRun, ablate
 from e2efly.learning.runner import train
+from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory
 from tests.learning.one_program import compile_once
@@ -40,7 +41,7 @@ def test_a_member_learns_as_a_run_alone_does(algo: str, tmp_path: Path, monkeypa
     for variant, seed, weights in variants:
         reward = dataclasses.replace(config.reward, weights=weights)
         out = tmp_path / f"{variant}"
-        train(dataclasses.replace(config, reward=reward, seed=seed), out, Silent())
+        train(Setup.of(dataclasses.replace(config, reward=reward, seed=seed)), RunDirectory(out), Silent())
         rows = [row for row in RunDirectory(out).rows() if "eval/hover/final_error" in row]
         alone = [row["eval/hover/final_error"] for row in rows]
         np.testing.assert_allclose(curves.error["hover"][variant, seed], alone, rtol=0.02)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from e2efly.config import StageConfig, TrainConfig
-from e2efly.learning.curriculum import stages
 from e2efly.learning.runner import train
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
-from e2efly.runs.rundir import RunDirectory, from_json, to_json
+from e2efly.runs.inputs import from_json, to_json
+from e2efly.runs.rundir import RunDirectory
 from tests.learning.test_runner import Silent, small
 
 NEAR = StageConfig({"position": 0.1, "velocity": 0.0}, success=0.0001, steps=512)
@@ -23,7 +23,7 @@ def with_stages(*curriculum: StageConfig) -> TrainConfig:
 
 
 def test_stages_differ_in_numbers_and_end_with_the_task() -> None:
-    first, second, last = stages(with_stages(NEAR, HALF))
+    first, second, last = Setup.of(with_stages(NEAR, HALF)).stages
     assert (first.env.task.config.position, second.env.task.config.position) == (0.1, 1.0)
     assert second.env.task.config.velocity == last.env.task.config.velocity == 1.0
     assert last.env.task.config == small().task and last.config is None
@@ -40,7 +40,7 @@ def test_stages_differ_in_numbers_and_end_with_the_task() -> None:
     ],
 )
 def test_promotion(stage: StageConfig, success: float, steps: int, over: bool) -> None:
-    first, last = stages(with_stages(stage))
+    first, last = Setup.of(with_stages(stage)).stages
     assert first.is_over(success, steps) == over
     assert not last.is_over(1.0, 10**9)
 
@@ -66,7 +66,7 @@ def test_a_run_goes_through_its_stages_and_compiles_once(tmp_path: Path, monkeyp
     counts: list[int] = []
     jax.monitoring.register_event_duration_secs_listener(count)
     config = with_stages(HALF, HALF)
-    train(config, tmp_path / "run", Told())
+    train(Setup.of(config), RunDirectory(tmp_path / "run"), Told())
     first, *rest = (text.removeprefix("vehicle of the file, ") for text in shown)
     assert first == "stage 2 of 3" and set(rest) == {"stage 3 of 3"} and len(shown) >= 4
     assert counts[0] == counts[-1] > 0, "nothing is compiled after the first chunk"
@@ -96,4 +96,4 @@ def test_a_bad_stage_is_refused_by_name(stage: StageConfig, message: str) -> Non
 def test_the_papers_curricula_are_presets() -> None:
     for task in ("avoid", "race_clutter"):
         for algo in ("ppo", "bptt"):
-            assert len(stages(presets.preset(task, algo, "paper"))) == 3
+            assert len(Setup.of(presets.preset(task, algo, "paper")).stages) == 3

@@ -57,6 +57,16 @@ def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> 
         assert e2efly.preset(task, algo) == config
         assert parse([task, "--algo", algo]).config == config
     assert parse(["hover"]).config == e2efly.preset("hover") == e2efly.preset("hover", "bptt", "robust")
+    for algo in ("ppo", "bptt"):  # of several, the last counts, also for what the preset depends on
+        assert parse(["hover", "--algo", "shac", f"--algo={algo}"]).config == e2efly.preset("hover", algo)
+
+
+def test_who_starts_from_a_policy_learns_gently_whatever_flies() -> None:
+    """The recipe for a family has a learning rate of its own."""
+    for vehicle in ("vis_r", "any"):
+        algo = presets.starting("hover", "bptt", "robust", vehicle, "any/hover").algo
+        assert algo == parse(["hover", "--vehicle", vehicle, "--from", "any/hover"]).config.algo
+        assert algo.learning_rate == algo.learning_rate_end
 
 
 def test_options_change_what_the_preset_draws_and_take_it_out() -> None:

@@ -20,10 +20,13 @@ from e2efly.config.numbers import Rule
 from e2efly.environment.episodes import Episodes
 from e2efly.learning import runner
 from e2efly.learning.checkpoint import read_about
-from e2efly.learning.runner import NonFiniteError, train
+from e2efly.learning.metrics import NonFiniteError
+from e2efly.learning.point import Point
+from e2efly.learning.runner import train
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
-from e2efly.runs.rundir import RunDirectory, from_json, to_json
+from e2efly.runs.inputs import from_json, to_json
+from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
 from tests.conftest import QUICK
 from tests.learning.one_program import compile_once
@@ -82,7 +85,7 @@ def small(task: str = "hover", algo: str = "ppo", **changes: Any) -> TrainConfig
 )  # fmt: skip
 def test_a_short_training_learns(task: str, algo: str, steps: int, success: float, tmp_path: Path) -> None:
     config = dataclasses.replace(presets.preset(task, algo), steps=steps, stop_at=max(success, 0.97))
-    summary = train(config, tmp_path / "run", Silent())
+    summary = train(Setup.of(config), RunDirectory(tmp_path / "run"), Silent())
     assert summary["reached_criterion"]
     reached = [value["success"] for name, value in summary["shipped"].items() if name != "update"]
     assert min(reached) >= success, summary
@@ -96,7 +99,7 @@ def test_a_thrown_vehicle_is_caught(tmp_path: Path) -> None:
     assert setup.env.task.episode_s == 3.0
     assert [judge.task.episode_s for judge in setup.judges.values()] == [10.0]
     assert setup.episode_steps == 300
-    summary = train(config, tmp_path / "run", Silent())
+    summary = train(Setup.of(config), RunDirectory(tmp_path / "run"), Silent())
     assert summary["reached_criterion"]
     assert summary["shipped"]["hover"]["success"] >= 0.985  # of other starts than those that it was stopped by
 
@@ -109,7 +112,7 @@ def test_what_met_the_criterion_is_shipped(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(runner, "success", lambda flown: next(successes))
     monkeypatch.setattr(runner, "score", lambda task, flown: next(scores))
     config = dataclasses.replace(small(), steps=10_240, stop_at=0.5)
-    summary = train(config, tmp_path / "run", Silent())
+    summary = train(Setup.of(config), RunDirectory(tmp_path / "run"), Silent())
     assert summary["finished"]
     assert summary["last"]["update"] == summary["shipped"]["update"] == 6
 
@@ -179,7 +182,7 @@ def test_what_other_algorithms_keep_is_enough_to_go_on_bit_for_bit(
     preset = "robust" if algo == "bptt" else "nominal"  # with a memory, and without
     flags = ["train", "hover", "--algo", algo, "--preset", preset, *SMALL, "--devices", "2", *MORE[algo]]
     assert command([*flags, "--out", "whole"]) == 0
-    save, saved = runner._save, []
+    save, saved = Point.save, []
 
     def killed_at_the_fourth(*args: Any) -> None:
         saved.append(args)
@@ -188,7 +191,7 @@ def test_what_other_algorithms_keep_is_enough_to_go_on_bit_for_bit(
         save(*args)
 
     with monkeypatch.context() as cut:
-        cut.setattr(runner, "_save", killed_at_the_fourth)
+        cut.setattr(Point, "save", killed_at_the_fourth)
         with pytest.raises(Killed):
             command([*flags, "--out", "cut"])
     assert len(RunDirectory(tmp_path / "cut").rows()) == 8
@@ -231,7 +234,7 @@ def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_checkpoint(
         config, algo=dataclasses.replace(config.algo, learning_rate=1e30, learning_rate_end=1e30)
     )
     with pytest.raises(NonFiniteError, match=r"(reward|loss).* became (nan|-?inf) in update \d+"):
-        train(dataclasses.replace(config, steps=100_000), tmp_path / "run", Silent())
+        train(Setup.of(dataclasses.replace(config, steps=100_000)), RunDirectory(tmp_path / "run"), Silent())
 
 
 def test_resume_refuses_another_configuration_and_names_it(tmp_path: Path) -> None:
@@ -239,13 +242,13 @@ def test_resume_refuses_another_configuration_and_names_it(tmp_path: Path) -> No
     RunDirectory(tmp_path / "run").create(config)
     other = dataclasses.replace(config, seed=5, algo=dataclasses.replace(config.algo, gamma=0.9))
     with pytest.raises(ValueError, match=r"algo.gamma: 0.96 and 0.9; seed: 0 and 5"):
-        train(other, tmp_path / "run", Silent(), resume=True)
+        train(Setup.of(other), RunDirectory(tmp_path / "run"), Silent(), resume=True)
 
 
 def test_resume_with_another_task_says_that_alone(tmp_path: Path) -> None:
     RunDirectory(tmp_path / "run").create(small())
     with pytest.raises(ValueError, match=r"another configuration: task: hover and land; algo: ppo and bptt$"):
-        train(small("land", "bptt"), tmp_path / "run", Silent(), resume=True)
+        train(Setup.of(small("land", "bptt")), RunDirectory(tmp_path / "run"), Silent(), resume=True)
 
 
 def test_resume_refuses_another_version(tmp_path: Path) -> None:
@@ -254,7 +257,7 @@ def test_resume_refuses_another_version(tmp_path: Path) -> None:
     run.create(config)
     run.write_json("versions.json", {**run.read_json("versions.json"), "jaxlib": "0.0.1"})
     with pytest.raises(ValueError, match=r"another version: jaxlib: 0\.0\.1 and "):
-        train(config, tmp_path / "run", Silent(), resume=True)
+        train(Setup.of(config), run, Silent(), resume=True)
 
 
 def test_the_next_process_of_a_run_clears_what_a_killed_one_had_not_finished(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from e2efly.environment.stress_rows import rows_for
 from e2efly.learning.onnx_export import contract_of
 from e2efly.learning.setup import Setup
 from e2efly.policy.zoo import FOLDER, USUAL, beside, config_file, contents, is_policy, names, policy_file
-from e2efly.runs.rundir import from_json
+from e2efly.runs.inputs import from_json
 from e2efly.simulation.device import wide_vectors
 from e2efly.tasks import TASKS
 from e2efly.validation import evaluation

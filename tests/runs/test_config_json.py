@@ -10,7 +10,7 @@ import pytest
 from e2efly.commands.cli import run
 from e2efly.config import ALGORITHMS
 from e2efly.runs import presets
-from e2efly.runs.rundir import from_json, to_json
+from e2efly.runs.inputs import from_json, to_json
 from e2efly.tasks import TASKS
 
 GOOD = json.loads(json.dumps(to_json(presets.preset("avoid", "ppo"))))

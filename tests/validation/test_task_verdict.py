@@ -16,7 +16,7 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.runtime import Runtime
 from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import BATCH as EVAL_BATCH
-from e2efly.validation.evaluation import act_of, episode_steps
+from e2efly.validation.evaluation import act_of
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import Trajectory, fly
 from e2efly.validation.plants.simulator import SimulatorPlant
@@ -59,7 +59,7 @@ def test_flights_of_the_runtime_are_judged_as_episodes(
     starts = draw_starts(env, N, SEED)
     verdicts = judge(env, starts, flown(path, env, starts, float(suite.episode_s)), settle)
 
-    key, steps = random_key(SEED, UNSEEN, 0), episode_steps(suite, env)
+    key, steps = random_key(SEED, UNSEEN, 0), env.episode_steps
     found, _ = run_stepwise(env, act_of(load_policy(path)), key, EVAL_BATCH, steps, settle)
     wanted = jax.tree.map(lambda x: x[:N], found)
     np.testing.assert_array_equal(verdicts.success, wanted.success)

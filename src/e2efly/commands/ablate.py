@@ -77,8 +77,8 @@ def _ablate(options: Ablate, configs: dict[tuple[str, str], TrainConfig], consol
         panels = []
         for task in options.tasks:
             began = time.perf_counter()
-            curves = known[algo, task] or _curves(options, configs[algo, task], console)
             vehicles = _vehicles(configs[algo, task])
+            curves = known[algo, task] or _curves(options, configs[algo, task], vehicles, console)
             rows = _rows(curves, 100 * criterion(None, vehicles))
             panels.append(CurvePanel(f"{task}, {vehicles}", curves, configs[algo, task].task.shows_error))
             took = "as found" if known[algo, task] else f"in {time.perf_counter() - began:.0f} s"
@@ -119,7 +119,7 @@ def _path(options: Ablate, config: TrainConfig) -> Path:
 def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
     """The settings that determine the curves."""
     from e2efly.learning.checkpoint import FORMAT
-    from e2efly.runs.rundir import to_json
+    from e2efly.runs.inputs import to_json
 
     groups = {"by": options.by} if options.by != "term" else {}  # curves by terms that are there already stay
     return {"format": FORMAT, "seeds": options.seeds, "config": to_json(config), **groups}
@@ -128,7 +128,7 @@ def _about(options: Ablate, config: TrainConfig) -> dict[str, Any]:
 def _known(options: Ablate, config: TrainConfig) -> Any:
     """The curves that an earlier run wrote, or None."""
     from e2efly.learning.ablation import Curves
-    from e2efly.runs.rundir import different_values
+    from e2efly.runs.inputs import different_values
 
     path = _path(options, config)
     if not path.exists():
@@ -140,7 +140,7 @@ def _known(options: Ablate, config: TrainConfig) -> Any:
     return Curves(tuple(found["variants"]), np.array(found["steps"]), **parts)
 
 
-def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
+def _curves(options: Ablate, config: TrainConfig, vehicles: str, console: Console) -> Any:
     """Train all variants of a configuration and keep their curves."""
     from e2efly.learning.ablation import KeptRun, ablate
     from e2efly.simulation.rewards import grouped
@@ -156,7 +156,7 @@ def _curves(options: Ablate, config: TrainConfig, console: Console) -> Any:
             nonlocal best
             best = max(best, success)
             done = share * steps
-            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, _vehicles(config))
+            progress.progress(int(done), steps, done / (time.perf_counter() - began), success, best, vehicles)
 
         kept = KeptRun(_path(options, config).with_suffix(".safetensors"), _about(options, config))
         curves = ablate(config, options.seeds, told, kept, options.by)

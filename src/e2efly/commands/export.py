@@ -71,13 +71,13 @@ def run(options: Export) -> int:
         return 0
     prepare("cpu")
     from e2efly.learning.onnx_export import contract_of, export_policy
-    from e2efly.learning.runner import load_policy_weights
+    from e2efly.learning.point import load_policy_weights
     from e2efly.learning.setup import Setup
     from e2efly.runs.rundir import RunDirectory
 
     folder = RunDirectory(options.run)
     setup = Setup.of(folder.config())
-    weights = load_policy_weights(setup, folder, options.which)
+    weights = load_policy_weights(folder.checkpoint, setup, options.which)
     path = out or folder.policy
     export_policy(path, weights, setup.actor, contract_of(setup.env, setup.config))
     console.print(f"Wrote the {options.which} policy of {options.run} to {path}")

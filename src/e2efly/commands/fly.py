@@ -28,7 +28,7 @@ from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
 from e2efly.flight.excitation import NAME as EXCITATION
 from e2efly.flight.filter.filter import Filter
-from e2efly.flight.flight_loop import LOWEST_RATE, fly, loop_rate
+from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
 from e2efly.flight.log_record import Log, Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
@@ -137,18 +137,33 @@ def _route(argument: str) -> type[Route] | None:
     return None
 
 
-def run(options: Fly) -> int:
-    """Fly, or with `check` print what prevents a flight.
+@dataclass(frozen=True)
+class _Prepared:
+    """What is to fly, checked as far as it can be without a link, poses or images."""
 
-    Returns:
-        0. With `check`, 1 when something forbids a take-off.
+    vehicle: str
+    """The vehicle: a name or a .toml file."""
+    body: Vehicle
+    hover: Any
+    """The controller for take-off, hover and landing."""
+    filter: Filter | None
+    """What `--guard filter` keeps inside the fence."""
+    policy: Path | None
+    """The policy's file. None: no policy flies, or the manoeuvres of identification do."""
+    loaded: Policy | None
+    runtime: Runtime | None
+    """What acts in mode POLICY. None: nothing, or another program."""
+    known: throttle_map.ThrottleMap | None
+    """The throttle map that an earlier flight learned."""
 
-    Raises:
-        ValueError: naming the option or setting, its value and what is accepted.
-        OSError: when the link, the pose source or the log cannot be opened.
-    """
-    raise_at_interrupt()  # its link and its log are closed in order
-    console, settings = Terminal(), options.flight
+    @property
+    def contract(self) -> Any:
+        return self.runtime.policy.contract if self.runtime else None
+
+
+def _prepared(options: Fly, console: Terminal) -> _Prepared:
+    """Check the options, and load what they name."""
+    settings = options.flight
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
         raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
@@ -186,13 +201,29 @@ def run(options: Fly) -> int:
     if excited:
         acts, course = excitation(body, settings, options.excitation, options.latency)
         runtime = Runtime.of(acts, course, body, envelope=options.envelope)
-    contract = runtime.policy.contract if runtime else None
     saved = options.throttle_map
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     if options.image and loaded is None:
         raise ValueError(f"--image is {options.image[0]!r}; accepted: none, as no policy sees it")
+    return _Prepared(flies, body, hover, filter, policy, loaded, runtime, known)
+
+
+def run(options: Fly) -> int:
+    """Fly, or with `check` print what prevents a flight.
+
+    Returns:
+        0. With `check`, 1 when something forbids a take-off.
+
+    Raises:
+        ValueError: naming the option or setting, its value and what is accepted.
+        OSError: when the link, the pose source or the log cannot be opened.
+    """
+    raise_at_interrupt()  # its link and its log are closed in order
+    console, settings, excited = Terminal(), options.flight, options.policy == Path(EXCITATION)
+    plan = _prepared(options, console)
+    body, hover, contract = plan.body, plan.hover, plan.contract
     targets = targets_of(options.live)
-    cameras = [] if loaded is None else open_cameras(options.image, loaded.contract)
+    cameras = [] if plan.loaded is None else open_cameras(options.image, plan.loaded.contract)
     open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
     with ExitStack() as stack:
         for camera in cameras:
@@ -211,17 +242,17 @@ def run(options: Fly) -> int:
         check_hover(options.hover, hover, info)
         rows = examine(info, body, settings, contract)
         print_settings(console, rows)
-        worker = _worker(runtime, commands, body, options)
+        worker = _worker(plan.runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
         bridge = Bridge(
             client, info, source, body, settings, worker=worker, latency=options.latency,
-            settings_problems=problems(rows), throttle_map=known, cameras=cameras, filter=filter,
-            hover=hover,
+            settings_problems=problems(rows), throttle_map=plan.known, cameras=cameras,
+            filter=plan.filter, hover=hover,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:
-            return look(bridge, source, console, rows, policy, contract)
+            return look(bridge, source, console, rows, plan.policy, contract)
         refuse_in_flight(bridge)
         service = Service()
         stack.callback(service.close)
@@ -229,7 +260,7 @@ def run(options: Fly) -> int:
         stack.callback(stop.restore)
         path = options.log or Path("flights") / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
         telemetry = stack.enter_context(Telemetry(path))
-        shown = _shown(options, flies)
+        shown = _shown(options, plan.vehicle)
         if shown is not None:
             stack.callback(shown.close)
         log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
@@ -254,20 +285,25 @@ def run(options: Fly) -> int:
         )  # fmt: skip
         telemetry.close()
         live.close()
-        late = sorted(timing.lateness)
-        p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
-        say(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
-        for problem, count in telemetry.problems.items():
-            say(f"log: {problem} ({count} times)")
-        if telemetry.missing:
-            say(f"log: {telemetry.missing}")
-        for problem in live.problems:
-            say(f"live {problem}")
+        _tell(say, timing, telemetry, live)
         path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         if excited:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
         say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
         return 0
+
+
+def _tell(say: Speaker, timing: Timing, telemetry: Telemetry, live: Live) -> None:
+    """Tell how punctual a flight was, and what its log and its listeners did not get."""
+    late = sorted(timing.lateness)
+    p99 = 1e3 * late[int(0.99 * (len(late) - 1))] if late else 0.0
+    say(f"{timing.rounds} control steps, late by {p99:.1f} ms (p99), {timing.missed} missed.")
+    for problem, count in telemetry.problems.items():
+        say(f"log: {problem} ({count} times)")
+    if telemetry.missing:
+        say(f"log: {telemetry.missing}")
+    for problem in live.problems:
+        say(f"live {problem}")
 
 
 def _shown(options: Fly, vehicle: str) -> "Shown | None":

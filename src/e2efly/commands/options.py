@@ -100,11 +100,14 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def peek(arguments: list[str], flag: str, default: str) -> str:
-    """The value of a flag, read before the other arguments are parsed: it decides which other flags exist."""
-    for i, argument in enumerate(arguments):
+def peek(arguments: list[str], flag: str) -> str | None:
+    """The value of a flag, read before the other arguments are parsed: it decides which other flags exist. As in the
+    parser, the last of several counts. None: the flag is not given, or has no value.
+    """
+    found = None
+    for argument, following in pairwise([*arguments, ""]):
         if argument.startswith(flag + "="):
-            return argument.split("=", 1)[1]
-        if argument == flag and i + 1 < len(arguments):
-            return arguments[i + 1]
-    return default
+            found = argument.split("=", 1)[1]
+        elif argument == flag:
+            found = following
+    return found or None

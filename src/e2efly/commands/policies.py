@@ -61,7 +61,7 @@ def named_first(command: str, arguments: list[str], given: str) -> "Candidate":
         raise ValueError(f"{command} begins with {arguments[0]}; accepted: the policy first, where {option}.* is given")
     from e2efly.validation.evaluation import candidate
 
-    return candidate(arguments[0], peek(arguments, "--vehicle", "") or None)
+    return candidate(arguments[0], peek(arguments, "--vehicle"))
 
 
 def with_task(options: type, task: TaskConfig) -> Any:

@@ -24,7 +24,7 @@ from rich.console import Console
 
 from e2efly.commands import train
 from e2efly.commands.terminal import Terminal, console_table, markdown
-from e2efly.config import ALGORITHMS, TrainConfig
+from e2efly.config import TrainConfig
 from e2efly.config.budget import check_time
 from e2efly.config.storage import held, write_atomically, write_json
 from e2efly.runs import presets
@@ -72,12 +72,12 @@ class Sweep:
     @property
     def algorithm(self) -> str:
         """`algo`, or the algorithm that learns the task best."""
-        return self.algo or TASKS.find(self.task).best
+        return presets.completed(self.task, self.algo)[0]
 
     @property
     def defaults(self) -> str:
         """`preset`, or the one that `e2efly train` uses."""
-        return self.preset or presets.default(TASKS.find(self.task), ALGORITHMS.find(self.algorithm))
+        return presets.completed(self.task, self.algo, self.preset)[1]
 
     @property
     def folder(self) -> Path:

@@ -4,7 +4,6 @@ import dataclasses
 import os
 import shlex
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -22,9 +21,9 @@ from e2efly.learning.supervised import is_watched, watched
 from e2efly.runs import presets
 from e2efly.simulation.device import Hosts, prepare
 from e2efly.tasks import TASKS
-from e2efly.vehicles.posterior import IDENTIFIED, load_posterior
 
 if TYPE_CHECKING:
+    from e2efly.runs.rundir import RunDirectory
     from e2efly.viewing.watch.beside import Beside
 
 _FLOWN = {"nominal": "best", "stress": "best", "shipped": "best", "last": "last"}
@@ -88,12 +87,23 @@ def parse(arguments: list[str]) -> Train:
     """
     from e2efly.runs.rundir import run_folder
 
-    parsed, config = _parsed(arguments)
-    if parsed.resume and parsed.overwrite:
+    arguments = _with_folder(arguments)
+    goes_on = "--resume" in arguments and arguments[0].startswith("-") and not asks_help(arguments)
+    defaults, preset = _of_run(arguments) if goes_on else _of_preset(arguments)
+    options, values = _options(defaults, preset)
+    task = [defaults.task.name] if goes_on else []
+    o = parse_options(options, "train", [*task, *arguments], default=values)
+    for option, said, known in (("--algo", o.algo_name, defaults.algo.name), ("--preset", o.preset, preset)):
+        if goes_on and said != known:
+            raise ValueError(
+                f"{option} is {said}, but {o.out} goes on as it began ({known}); accepted: to leave it out"
+            )
+    config = presets.changed(defaults, _given(o, defaults))
+    if o.resume and o.overwrite:
         raise ValueError("--resume and --overwrite are both given; accepted: one of them")
     return Train(
-        config, parsed.preset, parsed.out or run_folder(config), parsed.resume, parsed.overwrite, parsed.device,
-        parsed.plots, parsed.hosts, parsed.watch, arguments,
+        config, o.preset, o.out or run_folder(config), o.resume, o.overwrite, o.device, o.plots, o.hosts, o.watch,
+        arguments,
     )  # fmt: skip
 
 
@@ -107,24 +117,34 @@ def _again(o: Train) -> str:
 
 
 def _train(o: Train, again: str, console: Console) -> int:
-    from e2efly.learning.programs import traced_folder
     from e2efly.learning.runner import train
+    from e2efly.learning.setup import Setup
+    from e2efly.learning.usage import since_process_start
     from e2efly.runs.rundir import RunDirectory
 
+    setup = Setup.of(o.config)
+    run = RunDirectory(o.out)
     page = _page(o)
-    if o.resume and not RunDirectory(o.out).checkpoint.exists():
+    if o.resume and not run.checkpoint.exists():
         console.print("There is no checkpoint yet: the run begins at its beginning.")
     if page is not None:
         console.print(f"Watch it at {page.address} once it flies: the page has the time that the training leaves.")
     try:
-        title = f"{o.config.task.name} by {o.config.algo.name}"
+        title = f"{setup.config.task.name} by {setup.config.algo.name}"
         with TerminalProgress(console, title) if page is None else _ShownTraining(console, title, page) as progress:
-            summary = train(o.config, o.out, progress, o.resume, o.overwrite, traced=traced_folder(o.config))
-        status = _tell(o, again, console, summary, progress)
-        if page is not None and status == 0:
+            summary = train(setup, run, progress, o.resume, o.overwrite, traced=True)
+        _report(console, summary, setup.config)
+        if summary["stopped_by_user"]:
+            console.print(f"Stopped; {again}")
+            return 130
+        if o.plots and not console.quiet:
+            _draw(console, run, progress)
+        console.print(f"Policy: {run.policy} (its contract is inside; `e2efly eval {run.path}` flies it again)")
+        console.print(f"All of this took {since_process_start():.1f} s.")
+        if page is not None:
             console.print(f"Watch it at {page.address} (Ctrl-C ends it)")
             page.wait()
-        return status
+        return 0
     finally:
         if page is not None:
             page.close()
@@ -151,25 +171,15 @@ class _ShownTraining(TerminalProgress):
         super().progress(steps, total, rate, success, best, flown)
 
 
-def _tell(o: Train, again: str, console: Console, summary: dict[str, Any], progress: TerminalProgress) -> int:
-    from e2efly.learning.usage import since_process_start
+def _draw(console: Console, run: "RunDirectory", progress: TerminalProgress) -> None:
+    from e2efly.viewing.evaluation_plots import plot_run
 
-    _report(console, summary, o)
-    if summary["stopped_by_user"]:
-        console.print(f"Stopped; {again}")
-        return 130
-    if o.plots and not console.quiet:
-        from e2efly.viewing.evaluation_plots import plot_run
-
-        with console.status("Drawing plots"):
-            plot_run(o.out, *progress.end)
-        console.print(f"Plots: {o.out / 'plots'}")
-    console.print(f"Policy: {o.out / 'policy.onnx'} (its contract is inside; `e2efly eval {o.out}` flies it again)")
-    console.print(f"All of this took {since_process_start():.1f} s.")
-    return 0
+    with console.status("Drawing plots"):
+        plot_run(run, *progress.end)
+    console.print(f"Plots: {run.plots}")
 
 
-def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
+def _report(console: Console, summary: dict[str, Any], config: TrainConfig) -> None:
     from e2efly.learning.judge import verdict
 
     rows = [
@@ -180,7 +190,7 @@ def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
             "crashed": d["crashed"],
             **(
                 {}
-                if o.config.task.precision in TIMED
+                if config.task.precision in TIMED
                 else {
                     "final error": f"{100 * d['final_error_m']:.1f} cm",
                     "mean error": f"{100 * d['mean_error_m']:.1f} cm",
@@ -194,7 +204,7 @@ def _report(console: Console, summary: dict[str, Any], o: Train) -> None:
         if name != "update"
     ]
     took, steps = summary["seconds_trained_from_process_start"], summary["env_steps"] / 1e6
-    told = verdict(summary, o.config.stop_at)
+    told = verdict(summary, config.stop_at)
     console.print(
         f"\n{told}, trained by {took:.1f} s after the start of the process ({steps:.2f} M "
         f"environment steps). Flown from {summary['episodes']} starts that it never saw:"
@@ -263,61 +273,44 @@ def _help(kind: Any, text: str, **names: Any) -> Any:
     return Annotated[kind, tyro.conf.arg(help=text, **names)]
 
 
-def _config(options: Any, config: TrainConfig) -> TrainConfig:
-    """The `TrainConfig` for parsed options whose defaults came from a configuration."""
-    shared = {f.name: getattr(options, f.name) for f in dataclasses.fields(config)}
-    shared["curriculum"] = config.curriculum if options.curriculum else ()
-    changes, old = options.reward, config.reward
-    shared["reward"] = RewardConfig(_changed(old.weights, changes.weights), {**old.parameters, **changes.parameters})
-    own = config.env.randomize
-    if options.env.randomize.get(IDENTIFIED):  # the preset's draws are of a vehicle that nobody has measured
-        known = {entry.field for entry in load_posterior(options.vehicle).entries}
-        own = {name: width for name, width in own.items() if name not in known}
-    randomize = _changed(own, options.env.randomize)
-    shared["env"] = dataclasses.replace(options.env, randomize=randomize)
-    if options.vehicle != config.env.vehicle:
-        shared["env"] = dataclasses.replace(shared["env"], vehicle=options.vehicle)
-    return presets.begun(dataclasses.replace(config, **shared))
+def _given(o: Any, defaults: TrainConfig) -> TrainConfig:
+    """The options as a configuration, for `presets.changed`."""
+    shared = {f.name: getattr(o, f.name) for f in dataclasses.fields(defaults)}
+    shared["curriculum"] = defaults.curriculum if o.curriculum else ()
+    if o.vehicle != defaults.env.vehicle:
+        shared["env"] = dataclasses.replace(o.env, vehicle=o.vehicle)
+    return TrainConfig(**shared)
 
 
-def _changed(preset: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:
-    """The preset's numbers, replaced by those that were given. 0 removes a number."""
-    return {name: value for name, value in {**preset, **given}.items() if value != 0}
-
-
-def _parsed(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The options of `train`, and the configuration that they give."""
-    arguments = _with_folder(arguments)
-    if "--resume" in arguments and (not arguments or arguments[0].startswith("-")) and not asks_help(arguments):
-        return _parsed_of_run(arguments)
+def _of_preset(arguments: list[str]) -> tuple[TrainConfig, str]:
+    """The configuration that gives the defaults, and the name of its preset."""
     task = next((a for a in arguments[:1] if not a.startswith("-")), "hover")
-    algo = peek(arguments, "--algo", TASKS.find(task).best)
-    usual = presets.default(TASKS.find(task), ALGORITHMS.find(algo), lambda name: peek(arguments, f"--task.{name}", ""))
-    preset = peek(arguments, "--preset", usual)
-    config = presets.preset(task, algo, preset)
-    if vehicle := _vehicle(arguments):
-        config = presets.for_vehicle(config, vehicle)
-    if peek(arguments, "--from", ""):
-        config = presets.gentle(config)
+    algo, preset = presets.completed(
+        task, peek(arguments, "--algo"), peek(arguments, "--preset"), lambda name: peek(arguments, f"--task.{name}")
+    )
+    config = presets.starting(task, algo, preset, _vehicle(arguments), peek(arguments, "--from"))
     if arguments[:1] != [task] and not asks_help(arguments):
         raise ValueError(f"train needs a task first: {_join(TASKS)}")
-    return _parsed_as(config, preset, arguments)
+    return config, preset
 
 
-def _parsed_as(config: TrainConfig, preset: str, arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The same as `_parsed`, with the defaults of a configuration."""
-    options, defaults = _options(config, preset)
+def _of_run(arguments: list[str]) -> tuple[TrainConfig, str]:
+    """The same, for a run that continues and no named task: everything comes from the run."""
+    from e2efly.runs.rundir import RunDirectory
+
+    out = peek(arguments, "--out")
+    if out is None:
+        raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
     _vehicle(arguments)
-    parsed = parse_options(options, "train", arguments, default=defaults)
-    return parsed, _config(parsed, config)
+    return RunDirectory(Path(out)).config(), "the run"
 
 
-def _vehicle(arguments: list[str]) -> str:
-    """The requested vehicle; empty if none is requested."""
-    given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := peek(arguments, flag, ""))]
+def _vehicle(arguments: list[str]) -> str | None:
+    """The requested vehicle, if one is requested."""
+    given = [vehicle for flag in ("--vehicle", "--env.vehicle") if (vehicle := peek(arguments, flag))]
     if len(set(given)) > 1:
         raise ValueError(f"--vehicle is {given[0]} and --env.vehicle is {given[1]}; accepted: one of them alone")
-    return given[0] if given else ""
+    return given[0] if given else None
 
 
 def _with_folder(arguments: list[str]) -> list[str]:
@@ -328,22 +321,6 @@ def _with_folder(arguments: list[str]) -> list[str]:
         if argument == "--resume" and i + 1 < len(arguments) and not arguments[i + 1].startswith("-"):
             return [*arguments[:i], "--out", arguments[i + 1], "--resume", *arguments[i + 2 :]]
     return arguments
-
-
-def _parsed_of_run(arguments: list[str]) -> tuple[Any, TrainConfig]:
-    """The same as `_parsed`, for a run that continues and no named task: everything comes from the run."""
-    from e2efly.runs.rundir import RunDirectory
-
-    out = peek(arguments, "--out", "")
-    if not out:
-        raise ValueError("--resume names no run; accepted: the run's folder, as in `e2efly train --resume DIR`")
-    config = RunDirectory(Path(out)).config()
-    task, algo, preset = config.task.name, config.algo.name, "the run"
-    parsed, told = _parsed_as(config, preset, [task, *arguments])
-    for option, said, known in (("--algo", parsed.algo_name, algo), ("--preset", parsed.preset, preset)):
-        if said != known:
-            raise ValueError(f"{option} is {said}, but {out} goes on as it began ({known}); accepted: to leave it out")
-    return parsed, told
 
 
 def _join(names: Any) -> str:

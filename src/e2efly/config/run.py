@@ -8,7 +8,7 @@ from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import Thing
 from e2efly.config.env import FILE, CameraConfig, EnvConfig
-from e2efly.config.numbers import number
+from e2efly.config.numbers import check_fields, number
 from e2efly.config.registry import absolute
 
 
@@ -127,6 +127,28 @@ TIMED = ("duration", "pace")
 """Values of `TaskConfig.precision` for tasks flown against time. For them the distance from the goal has no meaning."""
 
 
+COUNTED = 2**24
+"""Largest number of control steps in an episode: float32 does not count further."""
+
+
+def check_counted(name: str, seconds: float, control_rate: float) -> None:
+    """Refuse an episode of a task with more control steps than `COUNTED`."""
+    if seconds * control_rate > COUNTED:
+        raise ValueError(
+            f"task.{name} is {seconds}; accepted: at most {COUNTED / control_rate:g} s, as far as float32 counts the "
+            f"control steps, 2^24 at {control_rate:g} Hz"
+        )
+
+
+def check_aloft(name: str, place: tuple[float, float, float], feet_height: float) -> None:
+    """Refuse a place of a task, world, m, at which a vehicle would touch the ground."""
+    if place[2] <= feet_height:
+        raise ValueError(
+            f"task.{name} is {place}; accepted: a place more than {feet_height:g} m over the ground, the "
+            "height of the centre of mass over the feet"
+        )
+
+
 @dataclass(frozen=True)
 class TaskConfig:
     """Options of a task, and everything that the commands need to know about it.
@@ -186,6 +208,23 @@ class TaskConfig:
     def criteria(self) -> "dict[str, TaskConfig]":
         """The criteria by which a policy is judged, by name. The worst result counts."""
         return {self.name: self}
+
+    def check(self, control_rate: float, feet_height: float) -> None:
+        """Check the numbers, individually and in combination. A task that has further rules adds them.
+
+        Args:
+            control_rate: Hz.
+            feet_height: height of the vehicle's centre of mass over its feet, m.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        del feet_height
+        check_fields("task", self)
+        check_counted("episode_s", self.episode_s, control_rate)
+        for name, part in vars(self).items():
+            if hasattr(part, "check"):
+                part.check(f"task.{name}")
 
     def course(self) -> dict[str, Any]:
         """The part of the course that all episodes share, for reports. `Goal.drawn` gives what each episode adds."""

@@ -58,6 +58,12 @@ DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
 
+def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
+    """The checked task of a vehicle."""
+    config.check(1 / physics.control_period, shape.feet_height)
+    return make_task(config, shape, physics.control_period, physics.substeps)
+
+
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=[
@@ -138,18 +144,18 @@ class Env:
             )
             physics = physics if flown.as_believed else physics.flying(body, dtype)
         posterior = posterior_of(config)
-        check(config, task, body, posterior)
+        check(config, vehicle, family, body, posterior)
         rewards.check(reward.weights, reward.parameters)
         late = config.action_latency or latencies_of(config, body, family if flown is None else None, posterior)
         frames = latency.frames(late[1], period)
         seen = frames if config.past_actions is None else config.past_actions
-        mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config)
+        mode, (low, high) = COMMAND_MODES[config.command_mode], limits_of(config, vehicle, family)
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         return Env(
             physics=physics,
-            task=make_task(task, shape, period, physics.substeps),
+            task=_flown_task(task, shape, physics),
             weights=dict(reward.weights),
             parameters=dict(reward.parameters),
             center=((low + high) / 2).astype(dtype),
@@ -169,6 +175,15 @@ class Env:
             past=latency.frames(oldest, period) + 1 if oldest else 0,
             family=family if flown is None else None,
         )
+
+    def on(self, task: TaskConfig) -> "Env":
+        """The same vehicle, air, sensors and reward with other options of a task: another criterion or stage."""
+        return dataclasses.replace(self, task=_flown_task(task, self.task.shape, self.physics))
+
+    @property
+    def episode_steps(self) -> int:
+        """Control steps of the longest episode."""
+        return int(np.ceil(float(self.task.episode_s) / self.control_period - 1e-6))
 
     @property
     def is_disturbed(self) -> bool:

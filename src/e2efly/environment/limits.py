@@ -4,8 +4,7 @@ import numpy as np
 
 from e2efly.config import EnvConfig
 from e2efly.control import COMMAND_MODES, command_limits
-from e2efly.vehicles.family import Family, load_family
-from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.family import Family
 from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -13,9 +12,9 @@ MOST = 10.0
 """Largest factor on the standard deviations of an identified vehicle from which episodes may draw."""
 
 
-def limits_of(config: EnvConfig) -> np.ndarray:
-    """Smallest and largest command, (2, 4). If the configuration gives none, those of the nominal vehicle, or of all
-    vehicles of a family together.
+def limits_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> np.ndarray:
+    """Smallest and largest command, (2, 4). If the configuration gives none, those of its vehicle, or of all vehicles
+    of its family together.
 
     Raises:
         ValueError: for a family in a command mode that its vehicles do not share, and for an invalid range.
@@ -27,11 +26,9 @@ def limits_of(config: EnvConfig) -> np.ndarray:
                 f"env.command_range is {config.command_range}; accepted: four finite numbers, and four that are larger"
             )
         return given
-    family = load_family(config.vehicle)
     if family is not None:
         return np.asarray(family.limits(config.command_mode), np.float64)
-    mode = COMMAND_MODES[config.command_mode]
-    return command_limits(mode, load_vehicle(config.vehicle), config.position_range)
+    return command_limits(COMMAND_MODES[config.command_mode], vehicle, config.position_range)
 
 
 def latencies_of(

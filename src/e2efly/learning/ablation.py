@@ -29,7 +29,7 @@ from e2efly.learning.judge import WATCHED
 from e2efly.learning.networks import Weights
 from e2efly.learning.programs import acting
 from e2efly.learning.setup import Setup
-from e2efly.runs.rundir import different_values
+from e2efly.runs.inputs import different_values
 from e2efly.simulation.rewards import grouped
 
 FULL = "full"

@@ -1,13 +1,14 @@
 """Curricula: stages of a run whose environments differ only in numbers, so that nothing has to be compiled again."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import jax
 import numpy as np
 
-from e2efly.config import StageConfig, TaskConfig, TrainConfig, check_fields
+from e2efly.config import StageConfig, TaskConfig, check_fields
 from e2efly.environment import Env
 
 
@@ -34,24 +35,24 @@ class CurriculumStage:
         return enough or (self.config.steps is not None and steps >= self.config.steps)
 
 
-def stages(config: TrainConfig) -> tuple[CurriculumStage, ...]:
-    """The stages of a run: those of the curriculum, then the task itself.
+def stages(env: Env, task: TaskConfig, curriculum: Sequence[StageConfig] = ()) -> tuple[CurriculumStage, ...]:
+    """The stages of a run: those of the curriculum, then the task itself, which `env` was built for.
 
     Raises:
         ValueError: naming the stage, its value and what is accepted.
     """
-    last = _stage(config, config.task, None)
+    last = _stage(env, task, None)
     shape = _shape(last)
     found = []
-    for i, stage in enumerate(config.curriculum):
+    for i, stage in enumerate(curriculum):
         where = f"curriculum[{i}]"
         if stage.success is None and stage.steps is None:
             raise ValueError(f"{where} has neither success nor steps; accepted: at least one of them, to end it")
         check_fields(where, stage)
-        task: Any = config.task
+        easier: Any = task
         for path, value in stage.changes.items():
-            task = changed(task, path, value, where)
-        found.append(_stage(config, task, stage))
+            easier = changed(easier, path, value, where)
+        found.append(_stage(env.on(easier), easier, stage))
         if _shape(found[-1]) != shape:
             raise ValueError(
                 f"{where}.changes has {', '.join(stage.changes)}; accepted: numbers that do not set shapes or the "
@@ -79,10 +80,8 @@ def changed(config: Any, path: str, value: Any, where: str) -> Any:
     return dataclasses.replace(config, **{name: value})
 
 
-def _stage(config: TrainConfig, task: TaskConfig, stage: StageConfig | None) -> CurriculumStage:
-    env = Env.of(task, config.reward, config.env)
-    judges = {name: Env.of(t, config.reward, config.env) for name, t in task.criteria().items()}
-    return CurriculumStage(env, judges, stage)
+def _stage(env: Env, task: TaskConfig, stage: StageConfig | None) -> CurriculumStage:
+    return CurriculumStage(env, {name: env.on(suite) for name, suite in task.criteria().items()}, stage)
 
 
 def _shape(stage: CurriculumStage) -> Any:

@@ -24,17 +24,16 @@ unseen starts of the report."""
 
 
 def judge(
-    setup: Setup, evaluate: Any, weights: Weights, stream: int, episodes: int, judges: dict[str, Env] | None = None
+    evaluate: Any, once: int, weights: Weights, stream: int, episodes: int, judges: dict[str, Env]
 ) -> dict[str, Episodes]:
-    """Fly `episodes` starts of a stream in every environment of `judges`. If none are given, these are the task's own
-    environments.
+    """Fly `episodes` starts of a stream in every environment of `judges`. `evaluate` (`Programs.evaluate`) gives `once`
+    at a time.
 
     Returns:
         The episodes by the name of their environment, as NumPy arrays.
     """
-    once = setup.config.eval_episodes
     flown = {}
-    for name, env in (setup.judges if judges is None else judges).items():
+    for name, env in judges.items():
         keys = [random_key(0, stream, i) for i in range(math.ceil(episodes / once))]
         parts = [jax.tree.map(lambda x: np.asarray(x)[:once], evaluate(env, weights, key)) for key in keys]
         flown[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)

@@ -45,7 +45,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         load_family(about.vehicle),
     )
     rate = vehicle.control_rate if about.control_rate is None else about.control_rate
-    low, high = limits_of(about)
+    low, high = limits_of(about, vehicle, family)
     _same("command_mode", physics.command_mode, mode.name)
     _same("control_period", physics.control_period, 1 / rate)
     for name in (field.name for field in (*quantities(), *terms())):

@@ -1,8 +1,8 @@
 """The objects that a configuration defines, before anything is compiled."""
 
 import dataclasses
-import math
 from dataclasses import dataclass
+from typing import Any
 
 from e2efly.config import TrainConfig
 from e2efly.environment import Env
@@ -36,8 +36,8 @@ class Setup:
             ValueError: naming the field, the value and what is accepted.
         """
         presets.check(config)
-        course = stages(config)
-        env = course[-1].env
+        env = Env.of(config.task, config.reward, config.env)
+        course = stages(env, config.task, config.curriculum)
         actor = Actor.of(env.fields, env.cameras, config.network)
         algorithm = make_algorithm(config.algo, actor)
         per_update = config.algo.steps
@@ -52,6 +52,10 @@ class Setup:
         """Refuse a configuration if `members` such runs, trained together, exceed a limit (`run_budget.py`)."""
         judged = self.episode_steps * len(self.judges)
         check_run(self.config, self.env, self.actor, self.updates, judged, members)
+
+    def parameters(self) -> Any:
+        """Fresh parameters of the algorithm."""
+        return self.algorithm.init(self.env, self.config.algo, self.config.seed)
 
     @property
     def vehicles(self) -> int:
@@ -88,8 +92,7 @@ class Setup:
     @property
     def episode_steps(self) -> int:
         """Control steps of the longest episode in which the policy is judged."""
-        longest = max(float(task.episode_s) for task in self.config.task.criteria().values())
-        return math.ceil(longest / self.env.control_period - 1e-6)
+        return max(env.episode_steps for env in self.judges.values())
 
     @property
     def settle(self) -> float:

@@ -4,7 +4,7 @@ A preset is a `TrainConfig`. A variant of one is made by `dataclasses.replace`.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from e2efly.config import (
@@ -73,20 +73,47 @@ def names() -> tuple[str, ...]:
     return ROBUST, IDENTIFIED, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
 
 
-def default(
-    task: type[TaskConfig], learner: type[AlgorithmConfig], given: Callable[[str], Any] = lambda name: None
-) -> str:
-    """The preset of a task if none is named: robust, if the algorithm has a recipe for it.
+def completed(
+    task: str, algo: str | None = None, name: str | None = None, given: Callable[[str], Any] = lambda option: None
+) -> tuple[str, str]:
+    """The algorithm and the preset of a training for which not both are named: the algorithm that learns the task best;
+    robust, if the algorithm has a recipe for it, otherwise nominal.
 
-    Args:
-        task: the class of the task's options.
-        learner: the class of the algorithm's options.
-        given: function from the name of a task option to its value. Some values require presets of their own.
+    `given` is the function from the name of a task option to its value: some values require presets of their own.
     """
-    for (name, value), asked in task.asked.items():
-        if given(name) == value:
-            return asked
-    return ROBUST if learner.name in task.robust else NOMINAL
+    options = TASKS.find(task)
+    algo = algo or options.best
+    usual = ROBUST if ALGORITHMS.find(algo).name in options.robust else NOMINAL
+    asked = (preset for (option, value), preset in options.asked.items() if given(option) == value)
+    return algo, name or next(asked, usual)
+
+
+def starting(task: str, algo: str, name: str, vehicle: str | None = None, start_from: str | None = None) -> TrainConfig:
+    """The configuration from which the options of a training depart: a preset (`preset`), for a vehicle (`for_vehicle`)
+    and for a policy whose weights it starts from (`gentle`).
+    """
+    config = preset(task, algo, name)
+    config = config if vehicle is None else for_vehicle(config, vehicle)
+    return config if start_from is None else dataclasses.replace(gentle(config), start_from=start_from)
+
+
+def changed(defaults: TrainConfig, given: TrainConfig) -> TrainConfig:
+    """The configuration for options that depart from a configuration, whichever it is.
+
+    The reward and `env.randomize` of `given` are changes: a number is added or replaced, and 0 removes one.
+    """
+    own = defaults.env.randomize
+    if given.env.randomize.get(posterior.IDENTIFIED):  # the preset's draws are of a vehicle that nobody has measured
+        known = {entry.field for entry in posterior.load_posterior(given.env.vehicle).entries}
+        own = {name: width for name, width in own.items() if name not in known}
+    weights = _merged(defaults.reward.weights, given.reward.weights)
+    reward = RewardConfig(weights, {**defaults.reward.parameters, **given.reward.parameters})
+    env = dataclasses.replace(given.env, randomize=_merged(own, given.env.randomize))
+    return begun(dataclasses.replace(given, reward=reward, env=env))
+
+
+def _merged(own: Mapping[str, float], given: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in {**own, **given}.items() if value != 0}
 
 
 def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:

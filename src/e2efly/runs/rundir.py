@@ -5,25 +5,19 @@ policy.onnx  summary.json
 """
 
 import csv
-import dataclasses
 import io
-import json
 import platform
-import reprlib
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
-from e2efly.config.reading import read
+from e2efly.config import EnvConfig, TrainConfig
 from e2efly.config.storage import held, read_json, write_atomically, write_json
-from e2efly.runs.inputs import Kept, by_content, content_of, input_files, replaced, sha256, value_at
-from e2efly.runs.presets import preset
-from e2efly.tasks import TASKS
+from e2efly.runs.inputs import Kept, by_content, copied, differences, from_json, to_json, with_copies
 
 _FILES = (
     "config.json", "versions.json", "inputs.json", "metrics.csv", "checkpoint.safetensors", "policy.onnx",
@@ -112,7 +106,7 @@ class RunDirectory:
             OSError: when the folder cannot be written.
             ValueError: when the folder already holds a run.
         """
-        inputs = {field: (path, content_of(path)) for field, path in input_files(config).items()}
+        inputs = copied(config, self.path / "inputs")
         if overwrite:  # only now, because the input files may belong to the run that is deleted
             self.clear()
         self.check_new()
@@ -121,19 +115,13 @@ class RunDirectory:
         except OSError as error:
             raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
         self.metrics.unlink(missing_ok=True)  # of a run that never reached a checkpoint
-        self._keep(config, inputs)
+        for kept, data in inputs.values():
+            kept.copy.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(kept.copy, data)
+        about = {field: kept.as_json() for field, (kept, _) in inputs.items()}
+        self.write_json("inputs.json", about)
         self.write_json("versions.json", versions())
         self.write_json("config.json", to_json(config))  # last: this file marks that the folder holds a run
-
-    def _keep(self, config: TrainConfig, inputs: dict[str, tuple[Path, bytes]]) -> None:
-        """Write copies of the files that a configuration names."""
-        about = {}
-        for field, (path, data) in inputs.items():
-            copy = self.path / "inputs" / field / path.name
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(copy, data)
-            about[field] = {"named": value_at(config, field), "original": str(path.absolute()), "sha256": sha256(data)}
-        self.write_json("inputs.json", about)
 
     def inputs(self) -> dict[str, Kept]:
         """The input files of the run, by the dotted path of the field. Runs of older versions have none.
@@ -156,9 +144,7 @@ class RunDirectory:
 
     def with_copies(self, config: TrainConfig) -> TrainConfig:
         """A configuration of the run in which the run's own copies replace the files that it names."""
-        for field, kept in self.inputs().items():
-            config = replaced(config, field, kept.usable())
-        return config
+        return with_copies(config, self.inputs())
 
     def write_json(self, name: str, content: dict[str, Any]) -> None:
         """Write a JSON file atomically."""
@@ -200,9 +186,7 @@ class RunDirectory:
         wanted = self.config()
         if type(config.task) is not type(wanted.task):  # no other difference matters, and other files are named
             raise self._another(differences(wanted, config))
-        for field, kept in self.inputs().items():
-            if value_at(config, field) == kept.named and not kept.original.exists():
-                config = replaced(config, field, kept.usable())
+        config = with_copies(config, self.inputs(), gone=True)
         if different := list(differences(by_content(wanted), by_content(config))):
             raise self._another(different)
 
@@ -295,59 +279,3 @@ def _version(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "not installed"
-
-
-def to_json(config: TrainConfig) -> dict[str, Any]:
-    """A configuration as JSON, with the names of its task and its algorithm, or references to them."""
-    names = {"task_name": TASKS.reference(type(config.task)), "algo_name": ALGORITHMS.reference(type(config.algo))}
-    return {**names, **dataclasses.asdict(config)}
-
-
-def fingerprint(config: TrainConfig) -> str:
-    """Twelve digits of the SHA-256 of everything that defines a training: its configuration, the content of its files,
-    and its criteria. Left out are the seed, and the number of devices, which follows from the machine.
-
-    Raises:
-        ValueError: when a file of the configuration cannot be read.
-    """
-    told = to_json(by_content(dataclasses.replace(config, seed=0, devices=None)))
-    criteria = {name: dataclasses.asdict(suite) for name, suite in config.task.criteria().items()}
-    return sha256(json.dumps([told, criteria], sort_keys=True).encode())[:12]
-
-
-def from_json(content: dict[str, Any], where: str) -> TrainConfig:
-    """The configuration that `to_json` wrote, in this version or an older one.
-
-    Raises:
-        ValueError: for unknown keys, and for missing keys without a default, naming them; for a value of another type,
-            naming the field, the value and what is accepted.
-    """
-    names = {"task_name": TASKS, "algo_name": ALGORITHMS}
-    if missing := sorted(names.keys() - content.keys()):
-        raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
-    for name, known in names.items():
-        if not isinstance(content[name], str):
-            raise ValueError(f"{where}: {name} is {reprlib.repr(content[name])}; accepted: {', '.join(known)}")
-    like = preset(content["task_name"], content["algo_name"])
-    rest = {name: value for name, value in content.items() if name not in names}
-    return read(TrainConfig, rest, where, {"task": type(like.task), "algo": type(like.algo)})
-
-
-def differences(a: TrainConfig, b: TrainConfig) -> Iterator[str]:
-    """The differences between two configurations, as `field: this and that`. If the task or the algorithm differs, only
-    these are given.
-    """
-    these, those = to_json(a), to_json(b)
-    kind = [name for name in ("task_name", "algo_name") if these[name] != those[name]]
-    yield from (f"{name.removesuffix('_name')}: {these[name]} and {those[name]}" for name in kind)
-    if not kind:
-        yield from different_values(these, those)
-
-
-def different_values(a: Any, b: Any, prefix: str = "") -> Iterator[str]:
-    """The differences between two JSON trees, as `field: this and that`."""
-    if isinstance(a, dict) and isinstance(b, dict):
-        for key in sorted({*a, *b}):
-            yield from different_values(a.get(key), b.get(key), f"{prefix}.{key}" if prefix else key)
-    elif a != b:
-        yield f"{prefix}: {a} and {b}"

@@ -415,9 +415,9 @@ def fly_criteria(
     envs = {name: found.environment(suite) for name, suite in suites.items()}
     asked = f"--episodes is {episodes}"
     check_memory({asked: float(episodes) * len(suites) * (FIGURES + kept)})
-    check_time({asked: sum(episode_steps(suites[name], envs[name]) for name in suites) * float(episodes) / FASTEST})
+    check_time({asked: sum(env.episode_steps for env in envs.values()) * float(episodes) / FASTEST})
     for name, suite in suites.items():
-        steps, settle = episode_steps(suite, envs[name]), settling(suite)
+        steps, settle = envs[name].episode_steps, settling(suite)
         keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
         parts = []
         for key in keys:
@@ -445,11 +445,6 @@ def act_of(policy: Policy | Baseline) -> Act:
 
     remembers = isinstance(policy, Policy)
     return Act(act, lambda n: np.zeros((n, contract.memory_size), np.float32) if remembers else None)
-
-
-def episode_steps(task: TaskConfig, env: Any) -> int:
-    """Number of control steps of the longest episode."""
-    return int(np.ceil(float(task.episode_s) / env.control_period - 1e-6))
 
 
 def check_observation(policy: Acting, env: Any) -> None:

@@ -85,7 +85,7 @@ def stress(
     for name, suite in suites.items():
         env = found.environment(suite)
         starts = draw_starts(env, episodes, seed)
-        steps = int(np.ceil(float(suite.episode_s) / env.control_period - 1e-6))
+        steps = env.episode_steps
         begins = list(zip(starts.states, starts.courses, strict=True))
         asked = []
         for row in chosen:

@@ -62,7 +62,7 @@ def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0
                 f"flights[{i}] has a control period of {flight.time[1]} s; accepted: the task's, {period} s"
             )
     flown = np.array([len(flight.action) for flight in flights])
-    steps = int(np.ceil(float(env.task.episode_s) / period - 1e-6))  # the longest episode: one program for all
+    steps = env.episode_steps  # the longest episode: one program for all
     states = _states(flights, steps)
     outcome = jax.tree.map(np.asarray, _advance(env.task, starts.memory, states, period))
     step = np.arange(steps)[:, None]

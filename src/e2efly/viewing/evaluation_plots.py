@@ -13,7 +13,7 @@ from e2efly.learning.judge import REPORTED
 from e2efly.learning.setup import Setup
 from e2efly.policy.loader import load_policy
 from e2efly.runs.rundir import RunDirectory
-from e2efly.validation.evaluation import Evaluation, act_of, episode_steps
+from e2efly.validation.evaluation import Evaluation, act_of
 from e2efly.viewing import plots
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.seen import plot_seen
@@ -35,32 +35,34 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
     title, key = f"{contract.task} on {contract.vehicle}", random_key(found.seed, UNSEEN, 0)
     for name, suite in suites.items():
         env, tag = flew.environment(suite), f"{title}: {name}" if len(suites) > 1 else title
-        flights = plots.fly(env, act_of(flew.policy), key, DRAWN, episode_steps(suite, env))
+        flights = plots.fly(env, act_of(flew.policy), key, DRAWN, env.episode_steps)
         _flights(flights, suite, env, key, folder, name, tag, f"{env.vehicles}, seed {found.seed}")
     plots.plot_errors(found.flown, folder / "errors.png", f"{title}, {flew.vehicles}", plots.limits(suites))
     if flew.run:
-        _learned(flew.run, folder, title)
+        config = flew.run.config(names_vehicle=True)
+        vehicles = Env.of(config.task, config.reward, config.env).vehicles
+        _learned(flew.run, folder, title, criterion(config.stop_at, vehicles), vehicles)
 
 
-def plot_run(run: Path, setup: Setup, flown: dict[str, Episodes]) -> None:
+def plot_run(run: RunDirectory, setup: Setup, flown: dict[str, Episodes]) -> None:
     """Draw the same plots for a run that has just ended, into its folder. Its flights are not flown again.
 
     Raises:
         OSError: when the folder cannot be created.
     """
-    folder, config = run / "plots", setup.config
+    folder, config = run.plots, setup.config
     title = f"{config.task.name} on {setup.env.physics.nominal.name}"
     _make(folder)
-    suites, act = config.task.criteria(), act_of(load_policy(RunDirectory(run).policy))
+    suites, act = config.task.criteria(), act_of(load_policy(run.policy))
     for name, env in (setup.nominal or setup.judges).items():
         tag = f"{title}: {name}" if len(suites) > 1 else title
-        key, steps = random_key(0, REPORTED, 0), episode_steps(suites[name], env)
+        key, steps = random_key(0, REPORTED, 0), env.episode_steps
         flights = plots.fly(env, act, key, DRAWN, steps)
         note = f"{env.vehicles}; trained by {config.algo.name}, seed {config.seed}"
         _flights(flights, suites[name], env, key, folder, name, tag, note)
     vehicles = next(iter((setup.nominal or setup.judges).values())).vehicles
     plots.plot_errors(flown, folder / "errors.png", f"{title}, {vehicles}", plots.limits(suites))
-    _learned(RunDirectory(run), folder, title)
+    _learned(run, folder, title, criterion(config.stop_at, setup.env.vehicles), setup.env.vehicles)
 
 
 def _make(folder: Path) -> None:
@@ -85,11 +87,9 @@ def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, nam
     plots.plot_time(flights, worst, folder / f"time_{name}.png", title, env.physics.nominal)
 
 
-def _learned(run: RunDirectory, folder: Path, title: str) -> None:
+def _learned(run: RunDirectory, folder: Path, title: str, least: float, vehicles: str) -> None:
+    """Draw the learning curves of a run, the success at which its task counts as learned, and the name of what flew."""
     if rows := run.rows():
         shipped = run.read_json("summary.json").get("shipped") if (run.path / "summary.json").exists() else None
         update = shipped.get("update") if isinstance(shipped, dict) else None
-        config = run.config(names_vehicle=True)
-        vehicles = Env.of(config.task, config.reward, config.env).vehicles
-        least = criterion(config.stop_at, vehicles)
         plots.plot_learning(rows, folder / "learning.png", title, update, least, vehicles)

@@ -11,6 +11,7 @@ from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig,
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import INK, Line, Mark, Thing, circle
 from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
+from e2efly.config.run import check_aloft, check_counted
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 
@@ -78,6 +79,18 @@ class HoverConfig(TaskConfig):
     spin: float = number(35.0, above=0, endless=True)
     """The episode fails at a higher body rate than this, rad/s: gyroscopes measure up to 2000 degrees per second.
     Without a rate loop, nothing else ends a tumble."""
+
+    def check(self, control_rate: float, feet_height: float) -> None:
+        """The target is over the ground, and the success can be held within the longest episode."""
+        super().check(control_rate, feet_height)
+        check_counted("judged_s", self.judged_s, control_rate)
+        check_aloft("target", self.target, feet_height)
+        longest = max(self.episode_s, self.judged_s)
+        if not 0 <= self.hold_s <= longest:
+            raise ValueError(
+                f"task.hold_s is {self.hold_s}; accepted: 0 to the {longest:g} s of task.episode_s, or of "
+                "task.judged_s if longer"
+            )
 
     def criteria(self) -> dict[str, TaskConfig]:
         """Episodes of length `judged_s`, if that is not 0."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 from e2efly.config import BPTTConfig, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
+from e2efly.config.run import check_aloft
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 
@@ -61,6 +62,13 @@ class HoverAwareConfig(TaskConfig):
     """Success: both must hold during this last part of the episode, s."""
     fence: float = number(defaults.HOVER_FENCE, above=0, endless=True)
     """The episode fails farther than this from the hover point, m."""
+
+    def check(self, control_rate: float, feet_height: float) -> None:
+        """The hover point is over the ground, and the success can be held within an episode."""
+        super().check(control_rate, feet_height)
+        check_aloft("target", self.target, feet_height)
+        if not 0 <= self.hold_s <= self.episode_s:
+            raise ValueError(f"task.hold_s is {self.hold_s}; accepted: 0 to the {self.episode_s:g} s of task.episode_s")
 
     @property
     def own_worlds(self) -> bool:

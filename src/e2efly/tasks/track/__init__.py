@@ -19,6 +19,7 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain
 from e2efly.config.numbers import BODY_RATE, SPEED
+from e2efly.config.run import check_aloft
 from e2efly.courses import defaults
 from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
 from e2efly.tasks.registry import register
@@ -86,6 +87,11 @@ class TrackConfig(TaskConfig):
     """Random polynomial: largest distance of its knots from the centre, m per axis."""
     polynomial_speed: float = number(2.5, high=SPEED)
     """Random polynomial: largest speed at a knot, m/s."""
+
+    def check(self, control_rate: float, feet_height: float) -> None:
+        """The centre of the reference is over the ground."""
+        super().check(control_rate, feet_height)
+        check_aloft("centre", self.centre, feet_height)
 
     def criteria(self) -> dict[str, TaskConfig]:
         """A policy trained on random references is judged on a circle and a lemniscate, which it has never seen."""

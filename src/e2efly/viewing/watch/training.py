@@ -34,9 +34,7 @@ class ShownProgress:
     """Updates of the available policies."""
 
     def __post_init__(self) -> None:
-        config = self.setup.config
-        parameters = self.setup.algorithm.init(self.setup.env, config.algo, config.seed)
-        self._like = parameters.policy
+        self._like = self.setup.parameters().policy
         self._act = jax.jit(partial(_act, self.setup.actor))
         self._weights: Any = None
         self._looked = -np.inf
