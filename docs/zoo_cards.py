@@ -58,7 +58,7 @@ package. Every command that takes a policy takes one by the name of its card:
   [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
   the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
 - **Pictures** show the first starts of `e2efly eval`: 12, or 6 where the policy sees. **Videos** show one of
-  these flights, from a camera that follows the vehicle. The green ball is where the policy is told to be.
+  these flights, from a camera behind the vehicle. The blue ring is around the place where the policy is told to be.
 - **Training curves** show the success of the evaluations on the way, as `TASK.curve.csv` beside the policy has it.
   Policies that were made before these files were kept have none. The command *trained by* makes such a run, with its
   curve in `plots/learning.png`; its result differs a little on another machine.

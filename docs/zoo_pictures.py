@@ -17,16 +17,18 @@ import jax
 import numpy as np
 from PIL import Image
 
-from e2efly.adapters.chase import Chase
 from e2efly.config import TaskConfig
 from e2efly.environment import UNSEEN, Env, random_key
-from e2efly.environment.episodes import Act
 from e2efly.policy.zoo import USUAL, contents, curve_file, policy_file
 from e2efly.simulation.device import prepare
 from e2efly.validation.evaluation import SEED, act_of, candidate
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.space import plot_flights
 from e2efly.viewing.style import CYCLE, figure
+from e2efly.viewing.watch.film import film
+from e2efly.viewing.watch.recorded import Recording
+from e2efly.viewing.watch.report import flight_of
+from e2efly.viewing.watch.simulation import moment
 from e2efly.viewing.worlds import plot_flights_in_worlds
 
 FOLDER = Path(__file__).parent / "zoo"
@@ -34,8 +36,8 @@ EPISODES, SEEN = 12, 6
 """Flights in a picture, and of a policy that sees."""
 WIDE, COLOURS = 800, 48
 """Of a picture: columns and colours."""
-FILM, QUALITY, LONGEST = (240, 160), 40, 8.0
-"""Of a video: pixels, WebP's quality, s."""
+FILM, QUALITY, LONGEST = (200, 320), 40, 8.0
+"""Of a video: rows and columns, WebP's quality, s."""
 PERIOD = 0.1
 """Seconds from frame to frame."""
 
@@ -80,21 +82,17 @@ def smaller(large: Path, path: Path) -> None:
     small.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
-def video(env: Env, act: Act, key: Any, flights: Flights, path: Path) -> None:
+def video(env: Env, suite: TaskConfig, key: Any, flights: Flights, path: Path) -> None:
     """The first flight that succeeds, as an animated WebP."""
-    n, row = len(flights.length), int(np.argmax(flights.success))
-    chase, step = Chase(env), jax.jit(lambda state, action: env.step(state, action, restart=False))
-    state, observation = env.reset(key, n)
-    memory, film = act.begin(n), []
-    for k in range(min(int(flights.length[row]), round(LONGEST / env.control_period))):
-        if k * env.control_period >= len(film) * PERIOD:
-            film.append(Image.fromarray(chase(state, row)).resize(FILM, Image.Resampling.LANCZOS))
-        images = tuple(np.asarray(image) for image in state.images)
-        action, memory = act.act(np.asarray(observation), images, memory)
-        state, out = step(state, action)
-        observation = out.final_observation
-    film[0].save(
-        path, save_all=True, append_images=film[1:], duration=round(1000 * PERIOD), loop=0, quality=QUALITY, method=6
+    row = int(np.argmax(flights.success))
+    state = env.reset(key, len(flights.length))[0]
+    begin = jax.tree.map(lambda x: np.asarray(x[row]), state.vehicle)
+    drawn, _ = moment(env, suite, state, row)
+    recording = Recording([flight_of("", begin, flights, row)], drawn.vehicle, drawn)
+    seconds = min(recording.length * recording.period, LONGEST)
+    shots = [Image.fromarray(shot) for shot in film(recording, seconds, 1 / PERIOD, size=FILM)]
+    shots[0].save(
+        path, save_all=True, append_images=shots[1:], duration=round(1000 * PERIOD), loop=0, quality=QUALITY, method=6
     )
 
 
@@ -118,7 +116,7 @@ def main() -> None:
         title = f"{found.policy.contract.task} on {found.policy.contract.vehicle}"
         picture(flights, suite, env, key, FOLDER / f"{vehicle}-{task}.png", title)
         if vehicle == USUAL:
-            video(env, act, key, flights, FOLDER / f"{vehicle}-{task}.webp")
+            video(env, suite, key, flights, FOLDER / f"{vehicle}-{task}.webp")
         print(name, f"{flights.success.mean():.0%}", flush=True)
 
 

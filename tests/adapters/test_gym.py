@@ -13,7 +13,6 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from e2efly.adapters import chase
 from e2efly.adapters.gym import QuadrotorEnv, QuadrotorVectorEnv
 from e2efly.config import TrainConfig
 from e2efly.environment import Env, random_key
@@ -27,12 +26,6 @@ def short(seconds: float = 0.2) -> TrainConfig:
     return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_s=seconds, hold_s=0.0))
 
 
-def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of what is made from here on: a picture of full size takes a second."""
-    monkeypatch.setattr(chase, "WIDTH", 48)
-    monkeypatch.setattr(chase, "HEIGHT", 32)
-
-
 def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
     return QuadrotorVectorEnv(task, n, **given)
 
@@ -40,8 +33,7 @@ def vector(task: Any = "hover", n: int = 4, **given: Any) -> QuadrotorVectorEnv:
 @pytest.mark.whole(but=1)
 @pytest.mark.filterwarnings("ignore:.*Box observation space.*")
 @pytest.mark.parametrize("task", ["hover", "avoid"])
-def test_gymnasiums_checker_accepts_it(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    small_pictures(monkeypatch)
+def test_gymnasiums_checker_accepts_it(task: str) -> None:
     check_env(gymnasium.make(f"e2efly/{task}-v0", render_mode="rgb_array").unwrapped)  # which draws, too
 
 
@@ -58,13 +50,12 @@ def test_every_task_is_registered_both_ways() -> None:
 
 
 @pytest.mark.whole
-def test_a_task_of_ones_own_is_made_by_its_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_of_ones_own_is_made_by_its_reference() -> None:
     task = f"{Path(__file__).parents[2] / 'examples' / '06_own_task.py'}:OrbitConfig"
     env: Any = gymnasium.make("e2efly/task-v0", task=task, render_mode="rgb_array").unwrapped
     assert type(env.stepper.config.task).__name__ == "OrbitConfig"
     env.reset(seed=0)
     assert env.render().shape == (320, 480, 3)
-    small_pictures(monkeypatch)
     kind = {"vectorization_mode": "vector_entry_point", "render_mode": "rgb_array"}
     envs: Any = gymnasium.make_vec("e2efly/task-v0", 3, task=task, **kind)
     envs.reset(seed=0)
@@ -172,16 +163,15 @@ def test_it_is_drawn_from_behind_with_its_goal(task: str) -> None:
 
 
 @pytest.mark.whole
-def test_all_of_a_batch_are_drawn_and_other_modes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_of_a_batch_are_drawn_and_other_modes_are_refused() -> None:
     envs = QuadrotorVectorEnv("hover", 3, render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="render before the first reset"):
         envs.render()
     envs.reset(seed=0)
     pictures = envs.render()
     assert pictures is not None
-    assert [chase.shape for chase in pictures] == [(320, 480, 3)] * 3
+    assert [picture.shape for picture in pictures] == [(320, 480, 3)] * 3
     assert np.any(pictures[0] != pictures[1])
-    small_pictures(monkeypatch)
     gates = QuadrotorVectorEnv("race_clutter", 6, render_mode="rgb_array")  # of as many gates as vehicles
     gates.reset(seed=0)
     assert len(gates.render() or ()) == 6

@@ -13,6 +13,7 @@ import e2efly
 from e2efly.commands.cli import COMMANDS, run
 from e2efly.commands.train import parse
 from e2efly.learning.judge import verdict
+from e2efly.runs.inputs import to_json
 from e2efly.vehicles.loading import vehicle_file
 from tests.learning.one_program import compile_once
 
@@ -214,6 +215,28 @@ def test_help_imports_no_jax(arguments: list[str]) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
     assert done.returncode == 0
     assert b"e2efly" in done.stdout or b"0." in done.stdout
+
+
+def test_a_configuration_file_gives_all_that_options_do_not_change(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, own = tmp_path / "mine.json", ["--seed", "3", "--task.track", "s_shaped", "--reward.weights", "goal", "2"]
+    first = parse(["race", "--algo", "ppo", *own]).config
+    file.write_text(json.dumps(to_json(first)), encoding="utf-8")
+    given = ["--config", str(file)]
+    assert parse(given).config == parse(["race", *given]).config == first
+    other = parse([*given, "--seed", "4", "--reward.weights", "goal", "0"])
+    assert (other.config.seed, other.config.task, other.out) == (4, first.task, Path("runs/race-ppo-4"))
+    assert {**other.config.reward.weights, "goal": 2.0} == first.reward.weights
+    for arguments, said in (
+        (["hover", *given], f"TASK is hover, but --config {file} gives the defaults (race); accepted: to leave it out"),
+        ([*given, "--algo", "bptt"], "--algo is bptt, but"),
+        ([*given, "--preset", "paper"], "--preset is paper, but"),
+        (["--config", str(tmp_path / "no.json")], "no.json cannot be read"),
+    ):
+        assert said in error_of(["train", *arguments], capsys)
+    file.write_text(json.dumps({**to_json(first), "sed": 1}), encoding="utf-8")
+    assert f"{file}: unknown or missing key: ['sed']" in error_of(["train", *given], capsys)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

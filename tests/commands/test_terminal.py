@@ -6,7 +6,8 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.terminal import Terminal, TerminalProgress, console_table
+from e2efly.commands import terminal
+from e2efly.commands.terminal import Terminal, TerminalProgress, console_table, counted, doing
 
 
 def shown(width: int, terminal: bool) -> str:
@@ -66,3 +67,16 @@ def test_what_was_compiled_says_nothing_about_the_time_left(
         told.progress(steps, 20_000_000, 1e6, 0.5, 0.5, "hover")
     lines = capsys.readouterr().out.splitlines()
     assert "left" not in lines[0] and lines[1].endswith("  14 s left") and lines[2].endswith("  8 s left")
+
+
+def test_what_takes_long_says_in_a_pipe_what_it_does_and_how_long_it_still_takes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, *(10.0 + 2.0 * k for k in range(6))])  # the first takes longer, as it is compiled
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock, 99.0))
+    console = Terminal()
+    with doing(console, "Planning"):
+        pass
+    assert list(counted(console, "Filming", "abcdef", 6)) == list("abcdef")
+    lines = ["Planning", "Filming: 2 of 6, 8 s left", "Filming: 5 of 6, 2 s left", "Filming: 6 of 6, 0 s left"]
+    assert capsys.readouterr().out.splitlines() == lines

@@ -40,7 +40,8 @@ def test_dockerfile(path) -> None:  # noqa: ANN001
     )
     assert len(installed) == 1
     assert set(filter(None, installed[0].split(","))) <= set(project["optional-dependencies"])
-    assert {*project["license-files"]} | ({project["readme"]} if "readme" in project else set()) <= set(sources)
+    read = {"setup.py", "README.md"} if "dynamic" in project else set()  # which writes the metadata from the README
+    assert {*project["license-files"]} | read <= set(sources)
     (entry,) = (json.loads(text) for name, text in found if name == "ENTRYPOINT")
     assert entry[-1] == "e2efly"
     assert "e2efly" in project["scripts"]

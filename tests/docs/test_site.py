@@ -1,6 +1,7 @@
 """The site builds without a warning, its links lead somewhere, and it loads nothing from other hosts."""
 
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -8,9 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import pytest
+import setuptools
 
 from tests.docs.pages import DOCS, ROOT
 
@@ -112,6 +115,20 @@ def test_links_of_the_readme_lead_to_files() -> None:
     links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert links
     assert not [link for link in links if not link.startswith("https://") and not (ROOT / link).exists()]
+
+
+def test_what_a_package_index_shows_links_to_the_repository_whose_address_stands_in_one_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given = dict[str, Any]()
+    monkeypatch.setattr(setuptools, "setup", lambda **keywords: given.update(keywords))
+    address = runpy.run_path(str(ROOT / "setup.py"))["ADDRESS"]
+    links = [*re.findall(r"\]\(([^)]+)\)", given["long_description"]), *given["project_urls"].values()]
+    assert not [link for link in links if not link.startswith(f"{address}/") and link != address]
+    files = [file for link in links for file in re.findall(f"{address}/(?:blob|raw)/main/([^#]+)", link)]
+    assert len(files) > 40
+    assert not [file for file in files if not (ROOT / file).exists()]
+    assert not [path for path in (ROOT / "README.md", ROOT / "pyproject.toml") if address in path.read_text("utf-8")]
 
 
 def test_the_installation_names_every_extra() -> None:

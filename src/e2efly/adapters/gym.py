@@ -14,7 +14,6 @@ from gymnasium.spaces import Box, Dict, Space
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from e2efly.adapters.chase import Chase
 from e2efly.adapters.stepper import Stepper, configured
 from e2efly.config import TrainConfig
 from e2efly.simulation.sensors.eyes import image_shape
@@ -23,6 +22,8 @@ from e2efly.tasks import TASKS
 Observation = np.ndarray | dict[str, np.ndarray]
 STATE, IMAGE = "state", "image_{}"
 """Names of the parts of an observation when there are cameras."""
+PICTURE = (320, 480)
+"""Rows and columns of what `render` returns."""
 
 
 def observation_space(stepper: Stepper) -> Space[Any]:
@@ -66,14 +67,10 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
         self.stepper = Stepper(configured(task), 1, raw)
         self.observation_space, self.action_space = observation_space(self.stepper), action_space()
         self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
-        self._chase: Chase | None = None
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """The picture of the vehicle, uint8 (h, w, 3). None without a render mode."""
-        if self.render_mode is None:
-            return None
-        self._chase = self._chase or Chase(self.stepper.env)
-        return self._chase(_started(self.stepper))
+        return None if self.render_mode is None else _picture(self.stepper, 0)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start an episode."""
@@ -114,17 +111,13 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self.num_envs = num_envs
         self.stepper = Stepper(configured(task), num_envs, raw)
         self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
-        self._chase: Chase | None = None
         self.single_observation_space, self.single_action_space = observation_space(self.stepper), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
         """The picture of each vehicle, uint8 (h, w, 3). None without a render mode."""
-        if self.render_mode is None:
-            return None
-        chase = self._chase = self._chase or Chase(self.stepper.env)
-        return tuple(chase(_started(self.stepper), i) for i in range(self.num_envs))
+        return None if self.render_mode is None else tuple(_picture(self.stepper, i) for i in range(self.num_envs))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start all episodes."""
@@ -151,10 +144,13 @@ def _rendering(metadata: dict[str, Any], mode: str | None, stepper: Stepper) -> 
     return mode, metadata | {"render_fps": round(1 / float(stepper.env.control_period))}
 
 
-def _started(stepper: Stepper) -> Any:
+def _picture(stepper: Stepper, row: int) -> np.ndarray:
     if stepper.state is None:
         raise RuntimeError("render before the first reset")
-    return stepper.state
+    from e2efly.viewing.watch.film import snapshot  # both import what only pictures need
+    from e2efly.viewing.watch.simulation import moment
+
+    return snapshot(*moment(stepper.env, stepper.config.task, stepper.state, row), PICTURE)
 
 
 def _seed(rng: np.random.Generator) -> int:

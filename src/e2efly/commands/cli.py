@@ -5,15 +5,13 @@ status.
 """
 
 import gc
-import importlib
-import signal
 import sys
-from typing import NoReturn, get_type_hints
+from typing import NoReturn
 
 from e2efly import __version__
 from e2efly.commands.terminal import Terminal
 from e2efly.config.names import nearest
-from e2efly.flight.process import write_nowhere
+from e2efly.flight.process import UNREAD, need_system, write_nowhere
 
 _EXAMPLES = {
     "train hover": "learn to hover, evaluate, export policy.onnx",
@@ -36,12 +34,15 @@ _EXAMPLES = {
     "firmware": "build the real Betaflight firmware for this machine",
     "airsim-settings VEHICLE": "AirSim's settings.json for a vehicle",
     "bench": "how fast this machine simulates and learns",
+    "completion bash": "a script with which bash or zsh completes what you type",
     "list": "tasks, vehicles, presets, algorithms; `list zoo`, `list rewards`, ... in full",
 }
 WHOLE = ("jax", "jaxlib", "jaxtyping", "matplotlib", "onnx", "optax", "safetensors", "scipy", "tensorboardX")
 """Packages that the distribution `e2efly` needs, but `e2efly-fly` (the part that flies, see onboard/) does not need."""
 _MOVES = ("fly", "hil")
 """Commands that move a real vehicle."""
+_SYSTEMS = {"fly": ("linux",), "hil": ("linux",), "firmware": ("linux",), "sweep": ("linux", "darwin")}
+"""Operating systems on which a command runs, as `sys.platform` names them. The others run on every one."""
 _MEANT = {
     "watch": ("play", "show", "view", "demo", "run", "simulate", "visualize"),
     "eval": ("test", "evaluate", "score"),
@@ -65,7 +66,7 @@ def main() -> NoReturn:
         sys.stdout.flush()
     except BrokenPipeError:  # whoever reads, as `head`, has enough
         write_nowhere()
-        status = 128 + signal.SIGPIPE
+        status = UNREAD
     sys.exit(status)
 
 
@@ -107,12 +108,11 @@ def run(arguments: list[str]) -> int:
 def _command(name: str, arguments: list[str]) -> int:
     if name not in COMMANDS:
         raise ValueError(_unknown(name))
-    module = importlib.import_module(f"e2efly.commands.{name.replace('-', '_')}")
-    if hasattr(module, "parse"):  # its options depend on the arguments
-        return module.run(module.parse(arguments))
-    from e2efly.commands.options import parse
+    need_system(f"`e2efly {name}`", *_SYSTEMS.get(name, (sys.platform,)))
+    from e2efly.commands.options import of_command
 
-    return module.run(parse(get_type_hints(module.run)["options"], name, arguments))
+    module, options = of_command(name, arguments)
+    return module.run(options)
 
 
 def _unknown(name: str) -> str:

@@ -12,7 +12,9 @@ from typing import Any
 
 import tyro
 
-HELP = ("-h", "--help", "--help-all")
+NAMES = "--help-names"
+"""Prints the options of a command for a program: one a line, with the words that it accepts, if these are known."""
+HELP = ("-h", "--help", "--help-all", NAMES)
 SIMILAR = 0.6
 """Least similarity of an option that is suggested, 0 to 1."""
 SUGGESTED = 3
@@ -32,6 +34,12 @@ def accepted(options: Any, given: dict[str, Any]) -> list[argparse.Action]:
         warnings.simplefilter("ignore")  # tyro has no other way to list them
         parser = tyro.extras.get_parser(options, add_help=False, **given)
     return [action for action in parser._actions if action.help != argparse.SUPPRESS]
+
+
+def names(actions: Sequence[argparse.Action]) -> str:
+    """What `NAMES` prints."""
+    lines = (" ".join([flag, *map(str, action.choices or ())]) for action in actions for flag in action.option_strings)
+    return "\n".join(lines)
 
 
 def refuse_unknown(given: Sequence[str], command: str, actions: Sequence[argparse.Action]) -> None:

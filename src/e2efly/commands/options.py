@@ -1,5 +1,6 @@
 """How options of a command are read."""
 
+import importlib
 import io
 import sys
 from contextlib import redirect_stderr
@@ -7,12 +8,12 @@ from dataclasses import MISSING, fields
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_type_hints
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from e2efly.commands.helping import accepted, asks_help, refuse_unknown, short_help
+from e2efly.commands.helping import NAMES, accepted, asks_help, names, refuse_unknown, short_help
 from e2efly.vehicles.posterior import IDENTIFIED
 
 T = TypeVar("T")
@@ -55,6 +56,9 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
     """
     given: dict[str, Any] = {"prog": f"e2efly {command}", "config": (tyro.conf.AvoidSubcommands,), "registry": _TYPES}
     given |= default
+    if NAMES in arguments:
+        print(names(accepted(options, given)))
+        raise SystemExit(0)
     if asks_help(arguments) and "--help-all" not in arguments:
         print(short_help(options.__doc__ or "", command, accepted(options, given)))
         raise SystemExit(0)
@@ -78,6 +82,14 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
         if isinstance(value, Path) and value.exists() and not (value.is_file() or value.is_dir()):
             raise ValueError(f"{name} is {value}; accepted: the path of a file or of a folder")
     return found
+
+
+def of_command(name: str, arguments: list[str]) -> tuple[Any, Any]:
+    """The module of a command, and its options from the arguments that follow its name."""
+    module = importlib.import_module(f"e2efly.commands.{name.replace('-', '_')}")
+    if hasattr(module, "parse"):  # its options depend on the arguments
+        return module, module.parse(arguments)
+    return module, parse(get_type_hints(module.run)["options"], name, arguments)
 
 
 def _once(arguments: list[str]) -> list[str]:

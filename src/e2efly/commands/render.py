@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
-from rich.progress import track
 
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, counted, doing
 from e2efly.config.names import unknown
 from e2efly.control import Quat
 from e2efly.courses.references import read_csv, through_points
@@ -87,30 +86,30 @@ def run(options: Render) -> int:
     if options.scene not in place_names() and not Path(options.scene).suffix:
         known = unknown("scene or policy", options.scene, [*place_names(), *names()])
         raise ValueError(f"{known}, a run directory, or the path of a scene file or a policy.onnx")
-    place = find_place(
-        options.scene, random_key(options.seed), options.scene_unit, options.scene_up, options.scene_materials
-    )
+    with doing(console, "Drawing a world"):
+        place = find_place(
+            options.scene, random_key(options.seed), options.scene_unit, options.scene_up, options.scene_materials
+        )
     out = options.out or Path("runs/render") / Path(options.scene).stem
     _make(out)
-    with console.status("Planning a flight"):
+    with doing(console, "Planning a flight"):
         tour = _tour(options, place)
     camera = sized(PRESETS[options.camera], PICTURE, options.width, options.height)
     position, quaternion = viewpoint(options, tour)
     where = f"{options.scene}, seed {options.seed}, {options.camera} at ({', '.join(f'{x:.1f}' for x in position)}) m"
     small = sized(PRESETS[options.camera], PANEL, options.width, options.height)
-    with console.status("Drawing pictures"):
+    with doing(console, "Drawing pictures"):
         exposed = exposure_of(small, place.scene, tour)
         where += f", exposed x {exposed:.1f}" if exposed > 1 else ""
         sight = look_around(camera, place.scene, options.time, position, quaternion, exposed=exposed)
         lidar = look_around(PRESETS["lidar"], place.scene, options.time, position, quaternion)
         write_pictures(sight, out, where)
         write_cloud(lidar, out / "lidar.png", f"{options.scene}, seed {options.seed}")
-        title = f"What sensors see: {Path(options.scene).stem}"
+    title = f"What sensors see: {Path(options.scene).stem}"
+    with doing(console, "Drawing every noise"):
         write_sheet(sight, lidar, place, tour, random_key(options.seed), out / "sheet.png", title, where)
     film = frames(small, place.scene, tour, PANEL if camera.projection == "pinhole" else 3 * PANEL, exposed)
-    written = write_video(
-        track(film, "Filming", total=len(tour.time), console=console, transient=True), out / "flight", PERIOD
-    )
+    written = write_video(counted(console, "Filming", film, len(tour.time)), out / "flight", PERIOD)
     console.print(f"Pictures: {out} (sheet.png has all of them)")
     console.print(f"Video: {', '.join(map(str, written))}, {tour.time[-1]:.1f} s of flight")
     return 0

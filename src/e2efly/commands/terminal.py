@@ -1,19 +1,28 @@
 """Output of commands: plain text, tables, and the progress of a run."""
 
-import signal
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from e2efly.flight.process import printable, write_nowhere
+from e2efly.flight.process import UNREAD, printable, write_nowhere
 
 
 class Terminal(Console):
@@ -44,7 +53,7 @@ class Terminal(Console):
         self.quiet = True
         write_nowhere()
         if threading.current_thread() is threading.main_thread():
-            raise SystemExit(128 + signal.SIGPIPE)
+            raise SystemExit(UNREAD)
 
 
 WIDE = 1000
@@ -128,6 +137,31 @@ class TerminalProgress:
         self._bar.update(self._task, figures=text)
         if not self._console.is_terminal:
             self._console.print(f"{self._title}: {text}")
+
+
+@contextmanager
+def doing(console: Console, what: str) -> Iterator[None]:
+    """Show what is being done: a line that moves, or if the output is not a terminal, one line."""
+    if not console.is_terminal:
+        console.print(what)
+    with console.status(what):
+        yield
+
+
+def counted(console: Console, title: str, items: Iterable[Any], total: int) -> Iterator[Any]:
+    """The items of which there are `total`, with a bar and the time left, or lines if the output is not a terminal."""
+    columns = TextColumn("{task.description}", markup=False), BarColumn(24), MofNCompleteColumn(), _TimeLeft()
+    began, told = 0.0, time.monotonic()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=total)
+        for done, item in enumerate(items, 1):
+            yield item
+            now = time.monotonic()
+            began = began or now  # the first one was compiled, too
+            bar.update(task, completed=done)
+            if not console.is_terminal and done > 1 and (now - told >= LINES_S or done == total):
+                console.print(f"{title}: {done} of {total}, {(now - began) * (total - done) / (done - 1):.0f} s left")
+                told = now
 
 
 def console_table(rows: list[dict[str, Any]]) -> Table:

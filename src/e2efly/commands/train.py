@@ -17,6 +17,7 @@ from e2efly.commands.options import peek
 from e2efly.commands.terminal import Terminal, TerminalProgress, console_table, seconds
 from e2efly.config import ALGORITHMS, EnvConfig, NetworkConfig, RewardConfig, TrainConfig
 from e2efly.config.run import TIMED
+from e2efly.config.storage import read_json
 from e2efly.learning.supervised import is_watched, watched
 from e2efly.runs import presets
 from e2efly.simulation.device import Hosts, prepare
@@ -88,16 +89,19 @@ def parse(arguments: list[str]) -> Train:
     from e2efly.runs.rundir import run_folder
 
     arguments = _with_folder(arguments)
-    goes_on = "--resume" in arguments and arguments[0].startswith("-") and not asks_help(arguments)
-    defaults, preset = _of_run(arguments) if goes_on else _of_preset(arguments)
+    named = not (arguments and arguments[0].startswith("-")) or asks_help(arguments)
+    file, goes_on = peek(arguments, "--config"), "--resume" in arguments and not named
+    defaults, preset = _of_file(file) if file else _of_run(arguments) if goes_on else _of_preset(arguments)
     options, values = _options(defaults, preset)
-    task = [defaults.task.name] if goes_on else []
+    task = [] if named or not (file or goes_on) else [defaults.task.name]
     o = parse_options(options, "train", [*task, *arguments], default=values)
-    for option, said, known in (("--algo", o.algo_name, defaults.algo.name), ("--preset", o.preset, preset)):
-        if goes_on and said != known:
-            raise ValueError(
-                f"{option} is {said}, but {o.out} goes on as it began ({known}); accepted: to leave it out"
-            )
+    for option, said, known in (
+        ("TASK", o.task_name, defaults.task.name), ("--algo", o.algo_name, defaults.algo.name),
+        ("--preset", o.preset, preset),
+    ):  # fmt: skip
+        if (file or goes_on) and said != known:
+            told = f"--config {file} gives the defaults ({known})" if file else f"{o.out} goes on as it began ({known})"
+            raise ValueError(f"{option} is {said}, but {told}; accepted: to leave it out")
     config = presets.changed(defaults, _given(o, defaults))
     if o.resume and o.overwrite:
         raise ValueError("--resume and --overwrite are both given; accepted: one of them")
@@ -221,6 +225,12 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
             tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}, {_OWN}.", metavar="TASK")],
         ),
         ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}, {_OWN}.", name="algo")),
+        (
+            "config",
+            _help(
+                Path | None, "Take the defaults, the task too, from a file: the config.json of a run, or one like it."
+            ),
+        ),
         ("preset", _help(str, f"Where the defaults come from: {_join(presets.names())}.")),
         (
             "vehicle",
@@ -252,8 +262,9 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
         ("reward", RewardConfig),
     ]
     options = dataclasses.make_dataclass("Train", every, frozen=True)
+    origin = f"preset {preset}" if preset in presets.names() else preset
     weights = ", ".join(f"{name} {weight:g}" for name, weight in config.reward.weights.items())
-    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are preset {preset}'s; reward: {weights}."
+    options.__doc__ = f"Train a policy ({task}, {algo}). The defaults are {origin}'s; reward: {weights}."
     top = {
         name: getattr(config, name)
         for name in ("seed", "steps", "chunk", "eval_episodes", "devices", "fast_compile", "stop_at")
@@ -262,9 +273,9 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
     # changes to the preset's; a filled dictionary would take no new names
     parts |= {"reward": RewardConfig(), "env": dataclasses.replace(config.env, randomize={})}
     defaults = options(
-        task_name=tyro.MISSING, algo_name=algo, preset=preset, vehicle=config.env.vehicle, out=None, resume=False,
-        start_from=config.start_from, overwrite=False, device=None, plots=True, curriculum=True, watch=None,
-        hosts=Hosts(), **top, **parts,
+        task_name=tyro.MISSING, algo_name=algo, config=None, preset=preset, vehicle=config.env.vehicle, out=None,
+        resume=False, start_from=config.start_from, overwrite=False, device=None, plots=True, curriculum=True,
+        watch=None, hosts=Hosts(), **top, **parts,
     )  # fmt: skip
     return options, defaults
 
@@ -292,6 +303,13 @@ def _of_preset(arguments: list[str]) -> tuple[TrainConfig, str]:
     if arguments[:1] != [task] and not asks_help(arguments):
         raise ValueError(f"train needs a task first: {_join(TASKS)}")
     return config, preset
+
+
+def _of_file(path: str) -> tuple[TrainConfig, str]:
+    """The same, for a configuration in a file."""
+    from e2efly.runs.inputs import from_json
+
+    return from_json(read_json(Path(path)), path), "the file"
 
 
 def _of_run(arguments: list[str]) -> tuple[TrainConfig, str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 import tyro
 
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, counted
 from e2efly.flight.process import be_idle
 from e2efly.policy.zoo import policy_file
 
@@ -213,10 +213,13 @@ def _poses(o: WatchOptions) -> "Iterator[Any]":
 
 
 def _draw(o: WatchOptions, path: Path, logs: list[Path], console: Terminal) -> int:
+    from e2efly.simulation.scenes.meshes.engine import needed
     from e2efly.viewing.video import check_film, write_film
     from e2efly.viewing.watch.film import film
 
     check_film(path)
+    with needed("mesh"):
+        import embreex  # noqa: F401
     if _is_source(o.what[0]):
         raise ValueError(f"--video is {path}, of {o.what[0]}; accepted: of a policy, a run, a report or logs")
     report = _report(o.what)
@@ -228,8 +231,8 @@ def _draw(o: WatchOptions, path: Path, logs: list[Path], console: Terminal) -> i
         source, _ = _flown(o, console)
         seconds = o.seconds or FILM_S
     rate = 1 / seconds if path.suffix == ".png" else FILM_HZ  # of a still, the last moment alone
-    with console.status(f"Drawing {seconds:g} s of flight"):
-        write_film(film(source, seconds, rate, o.camera), path, 1 / rate)
+    shots = film(source, seconds, rate, o.camera)
+    write_film(counted(console, f"Drawing {seconds:g} s of flight", shots, round(seconds * rate)), path, 1 / rate)
     console.print(f"Video: {path}")
     return 0
 

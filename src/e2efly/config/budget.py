@@ -3,8 +3,9 @@
 Estimates are low rather than high: a refused command would not fit, but an accepted one may still be too large.
 """
 
+import math
 import os
-import resource
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -17,12 +18,16 @@ _UNITS = {"year": 365.25 * 86_400, "day": 86_400.0, "hour": 3600.0, "minute": 60
 
 
 def machine_memory() -> float:
-    """Main memory, including swap, that this process may use, bytes."""
-    limits = [float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") + _swap()]
-    limits.append(float(resource.getrlimit(resource.RLIMIT_AS)[0] % 2**64))  # -1 means no limit
+    """Main memory, including swap, that this process may use, bytes. Infinite on Windows, which is not asked."""
+    limits = [math.inf]
+    if sys.platform != "win32":
+        import resource
+
+        limits.append(float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES") + _swap())
+        limits.append(float(resource.getrlimit(resource.RLIMIT_AS)[0] % 2**64))  # -1 means no limit
     for file in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with suppress(OSError, ValueError):  # "max", or no such group
-            limits.append(float(Path(file).read_text()))
+            limits.append(float(Path(file).read_text(encoding="ascii")))
     return min(limits)
 
 
@@ -64,7 +69,7 @@ def check_time(seconds: Mapping[str, float], how: str = f"even at {FASTEST / 1e6
 
 def _swap() -> float:
     with suppress(OSError, StopIteration):
-        lines = Path("/proc/meminfo").read_text().splitlines()
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         return 1024.0 * int(next(line for line in lines if line.startswith("SwapTotal:")).split()[1])
     return 0.0
 

@@ -1,6 +1,5 @@
 """Files that survive a crash: complete writes, JSON without NaN, folders with only one writing process at a time."""
 
-import fcntl
 import io
 import json
 import math
@@ -8,6 +7,7 @@ import os
 import reprlib
 import socket
 import struct
+import sys
 import tokenize
 import zipfile
 import zlib
@@ -170,18 +170,20 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
     try:
         with suppress(OSError):  # on a full disk it gives no details, but the lock still holds
             os.ftruncate(file, 0)
-            os.pwrite(file, about.encode(), 0)
+            os.lseek(file, 0, os.SEEK_SET)
+            os.write(file, about.encode())
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(file)
+        _unlock(file, path)
         if anew:
             with suppress(OSError):  # the folder is not empty
                 folder.rmdir()
 
 
 def _runs(process: str) -> bool:
-    """Whether a process of this number runs on this machine."""
+    """Whether a process of this number runs on this machine. Windows is not asked: there, every one may run."""
+    if sys.platform == "win32":  # signal 0 would be Ctrl-C
+        return True
     try:
         os.kill(int(process), 0)
     except (ValueError, ProcessLookupError, OverflowError):
@@ -194,15 +196,45 @@ def _runs(process: str) -> bool:
 def _locked(path: Path) -> int:
     """A descriptor of the file, with the lock on it."""
     while True:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(file)
             if path.exists() and os.path.samestat(os.fstat(file), path.stat()):
                 return file
         except OSError:
             os.close(file)
             raise
         os.close(file)  # of a file that its last holder has removed meanwhile
+
+
+_LOCKED = 2**30
+"""The byte that is locked on Windows, far behind the text: others may read what is not locked."""
+
+
+def _lock(file: int) -> None:
+    """Lock an open file, or raise `BlockingIOError`."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(file, _LOCKED, os.SEEK_SET)
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except PermissionError as error:
+            raise BlockingIOError(str(error)) from None
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _unlock(file: int, path: Path) -> None:
+    if sys.platform == "win32":  # there, an open file cannot be removed: one that another process has opened stays
+        os.close(file)
+        with suppress(OSError):
+            path.unlink()
+    else:  # an unlocked file may already be another process's
+        path.unlink(missing_ok=True)
+        os.close(file)
 
 
 def _holder(path: Path) -> str:

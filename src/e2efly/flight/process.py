@@ -8,13 +8,33 @@ import gc
 import io
 import os
 import signal
+import socket
 import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+UNREAD = 141
+"""Exit status when nobody reads the output any more: 128 and the number of SIGPIPE, which Windows does not have."""
+SYSTEMS = {"linux": "Linux", "darwin": "macOS", "win32": "Windows"}
+"""Names of operating systems, by those in `sys.platform`."""
 _once = threading.Lock()
+
+
+def need_system(what: str, *systems: str) -> None:
+    """Refuse what does not run on this operating system.
+
+    Args:
+        what: the name of what was asked for.
+        systems: the systems on which it runs, as `sys.platform` names them.
+
+    Raises:
+        OSError: on another one, naming it and them.
+    """
+    if sys.platform not in systems:
+        accepted = " or ".join(SYSTEMS.get(system, system) for system in systems)
+        raise OSError(f"{what} does not run on {SYSTEMS.get(sys.platform, sys.platform)}; accepted: {accepted}")
 
 
 def open_streams() -> None:
@@ -56,13 +76,13 @@ def end_at_interrupt() -> None:
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return
     signal.signal(signal.SIGINT, _end)
-    reading, writing = os.pipe()
-    os.set_blocking(writing, False)
-    signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    reading, writing = socket.socketpair()  # every system wakes a socket, but not every one a pipe
+    writing.setblocking(False)
+    signal.set_wakeup_fd(writing.detach(), warn_on_full_buffer=False)
 
     def watch() -> None:
         """Python runs its handler between two instructions of the main thread, so only after a compilation."""
-        while signals := os.read(reading, 64):
+        while signals := reading.recv(64):
             if signal.SIGINT in signals and signal.getsignal(signal.SIGINT) is _end:
                 _end()
 
@@ -84,7 +104,7 @@ def be_idle() -> None:
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
         if os.getsid(0) == os.getpid():  # Linux shares cores among sessions first; less would stop it for minutes
-            Path("/proc/self/autogroup").write_text("10")
+            Path("/proc/self/autogroup").write_text("10", encoding="ascii")
 
 
 MLOCK_CURRENT, MLOCK_FUTURE, MLOCK_ONFAULT = 1, 2, 4

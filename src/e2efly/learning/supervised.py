@@ -54,7 +54,8 @@ def watched(command: list[str], lost: Callable[[str], str]) -> int:
         del frame
         process.send_signal(signum)
 
-    before = {s: signal.signal(s, hand_on) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    ending = (signal.SIGINT, signal.SIGTERM, *([] if sys.platform == "win32" else [signal.SIGHUP]))
+    before = {number: signal.signal(number, hand_on) for number in ending}
     kept: list[bytes] = []
     try:
         with process:

@@ -26,7 +26,9 @@ KINDS: dict[str, StreamKind] = {
     "body_rate": StreamKind(("wx", "wy", "wz"), "rad/s", "about body x, y, z"),
     "specific_force": StreamKind(("ax", "ay", "az"), "m/s^2", "accelerometer, body: (0, 0, 9.81) at rest"),
     "rotor_speed": StreamKind(("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file"),
-    "motor": StreamKind(("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the vehicle file's order"),
+    "motor": StreamKind(
+        ("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the order of the vehicle's file"
+    ),
     "command": StreamKind(
         ("cmd_thrust", "cmd_wx", "cmd_wy", "cmd_wz"), "m/s^2, rad/s",
         "thrust over mass and body rates (command mode ctbr) that were sent, each held until the next",

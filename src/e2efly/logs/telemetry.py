@@ -52,7 +52,7 @@ class Telemetry:
         self.path = Path(path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         except OSError as error:
             if isinstance(error, FileExistsError) and self.path.exists():
                 raise ValueError(f"flight log {str(path)!r} exists already; accepted: a new file") from None

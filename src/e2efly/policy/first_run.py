@@ -6,18 +6,21 @@ This script needs NumPy and ONNX Runtime alone.
 """
 
 import io
-import resource
 import sys
 
 import numpy as np
 import onnxruntime
+
+if sys.platform != "win32":  # Windows limits no process in this way; there, the process that waits ends it
+    import resource
 
 
 def main(mib: int, seconds: int) -> None:
     """Load and run the network."""
     given = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)
     content, inputs = given["content"].tobytes(), [given[f"arr_{i}"] for i in range(len(given.files) - 1)]
-    _limit(resource.RLIMIT_CPU, seconds)  # also where the process that waits for this one is gone
+    if sys.platform != "win32":
+        _limit(resource.RLIMIT_CPU, seconds)  # also where the process that waits for this one is gone
     if sys.platform == "linux":
         with open("/proc/self/statm") as file:  # noqa: PTH123
             _limit(resource.RLIMIT_AS, int(file.read().split()[0]) * resource.getpagesize() + (mib << 20))
@@ -30,9 +33,10 @@ def main(mib: int, seconds: int) -> None:
 
 def _limit(kind: int, most: int) -> None:
     """Lower a limit of this process."""
-    _, hard = resource.getrlimit(kind)
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    resource.setrlimit(kind, (most, most))
+    if sys.platform != "win32":
+        _, hard = resource.getrlimit(kind)
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(kind, (most, most))
 
 
 if __name__ == "__main__":

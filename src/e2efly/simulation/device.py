@@ -108,7 +108,7 @@ def processor(told: str | None = None) -> tuple[str, bool | None]:
         told: the system's description of its processors. If left out: /proc/cpuinfo, if it exists.
     """
     file = Path("/proc/cpuinfo")
-    told = told if told is not None else file.read_text() if file.exists() else ""
+    told = told if told is not None else file.read_text(encoding="utf-8") if file.exists() else ""
     about = {
         name.strip(): value.strip() for name, colon, value in (x.partition(":") for x in told.splitlines()) if colon
     }
@@ -127,7 +127,8 @@ def one_core() -> Iterator[None]:
         yield
         return
     whole = os.sched_getaffinity(0)
-    core = int(Path("/proc/thread-self/stat").read_text().rsplit(")", 1)[1].split()[36])  # its 39th field
+    told = Path("/proc/thread-self/stat").read_text(encoding="ascii")
+    core = int(told.rsplit(")", 1)[1].split()[36])  # its 39th field
     os.sched_setaffinity(0, {core})
     try:
         yield

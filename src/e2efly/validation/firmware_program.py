@@ -18,6 +18,7 @@ from pathlib import Path
 
 from e2efly.config.storage import cache_folder
 from e2efly.flight.betaflight.versions import Release, SitlLayout, release_of
+from e2efly.flight.process import need_system
 from e2efly.simulation.device import cores
 
 PACKAGE, VERSION = "betaflight", "0.0.6"
@@ -56,6 +57,7 @@ def chosen() -> Firmware:
         OSError: when it cannot be built, or the chosen program no longer exists.
         ValueError: when the stored data of the chosen program cannot be read.
     """
+    need_system("the firmware", "linux")
     choice = _choice()
     return identified(Path(choice.read_text(encoding="utf-8").strip())) if choice.is_file() else build()
 

@@ -104,7 +104,8 @@ def find_place(
         config = ForestConfig()
         route = np.array([[0.0, 0.0, 2.0], [config.length, 0.0, 2.0]])
         start, goal = (jnp.asarray(point)[None] for point in route)
-        return _place({"cylinder": generate.forest(key, 1, config, start, goal)}, route)
+        forest = jax.jit(lambda key: generate.forest(key, 1, config, start, goal))  # as one program, kept on disk
+        return _place({"cylinder": forest(key)}, route)
     if name == "clutter":
         route = np.array([[0, 0, 1.5], [7, 2, 2], [14, -2, 1.5], [21, 0, 2]], float)
         return _place(_clutter(key, ClutterConfig(obstacles=28, room=32, moving=0.3), route), route)

@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray
@@ -37,7 +38,12 @@ BAR = {"pad": 0.01, "fraction": 0.03, "aspect": 12}
 
 def noised(config: ImageNoiseConfig, key: PRNGKeyArray, image: np.ndarray, camera: CameraConfig) -> np.ndarray:
     """One image, (h, w) or (h, w, 3), with noise."""
-    return np.asarray(add_image_noise(config, key, jnp.asarray(image, jnp.float32)[None], camera))[0]
+
+    @jax.jit  # as one program, which is kept on disk
+    def seen(key: PRNGKeyArray, image: jax.Array) -> jax.Array:
+        return add_image_noise(config, key, image, camera)
+
+    return np.asarray(seen(key, jnp.asarray(image, jnp.float32)[None]))[0]
 
 
 def write_sheet(

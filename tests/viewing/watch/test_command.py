@@ -25,6 +25,7 @@ from tests.waiting import free_port, running, until
     (["any/hovr"], "unknown policy 'any/hovr'; did you mean 'any/hover'?"),
     (["hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'"),
     (["hover", "--video", "x.mp4"], "needs the program ffmpeg; accepted: that, or a name that ends in .webm or .gif"),
+    (["hover", "--video", "x.gif"], "need the package embreex: pip install 'e2efly[mesh]'"),
     (["hover", "--criterion", "x"], "--criterion is 'x'; accepted: hover"),
     (["hover", "--video", "x.avi"], "accepted: a name that ends in .gif, .mp4, .webm, .png"),
 ])  # fmt: skip
@@ -34,6 +35,8 @@ def test_bad_input_is_named_before_there_is_a_page(
     from e2efly.commands.cli import run
 
     monkeypatch.setenv("PATH", "")  # without ffmpeg
+
+    monkeypatch.setitem(sys.modules, "embreex", None)
 
     port = [] if "--port" in arguments else ["--port", "0"]
     assert run(["watch", *arguments, *port]) == 2

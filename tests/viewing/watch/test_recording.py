@@ -13,10 +13,10 @@ from e2efly.flight.pose.sources import open_source
 from e2efly.simulation.scenes.faces import box
 from e2efly.validation.processes import free_port
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.viewing.watch.film import Soup, beside, film, picture
+from e2efly.viewing.watch.film import Soup, beside, film, picture, snapshot
 from e2efly.viewing.watch.poses import Poses
 from e2efly.viewing.watch.recorded import PERIOD, Recording, read_flight
-from e2efly.viewing.watch.stage import StageFrame
+from e2efly.viewing.watch.stage import Stage, StageFrame
 from e2efly.viewing.watch.triangles import SKY, mesh_of
 
 
@@ -64,6 +64,28 @@ def test_a_picture_shows_what_stands_before_the_eye() -> None:
     assert abs(rows.mean() - 44.5) < 2
     assert abs(columns.mean() - 79.5) < 2
     assert seen[5].mean() != pytest.approx(seen[85].mean(), abs=3)  # sky and ground
+
+
+def test_lines_on_the_ground_make_no_pattern_far_away() -> None:
+    seen = picture(Soup.of([]), np.array([0.1, 0.2, 1.0]), np.array([5.0, 1.3, 1.0]), True).astype(float)
+    away = seen[190:205].std(axis=(0, 1)).max()  # just under the horizon: lines are narrower than pixels
+    assert away < 2.5
+    assert seen[300:].std(axis=(0, 1)).max() > 2 * away  # lines close by are to be seen
+
+
+@pytest.mark.parametrize("name", ["vis_r", "crazyflie"])
+def test_the_vehicle_is_large_and_its_goal_does_not_cover_it(name: str) -> None:
+    here, level = np.array([[1.0, 2.0, 1.5]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    stage = Stage(load_vehicle(name), ground=False)
+
+    def seen(*goal: np.ndarray) -> np.ndarray:
+        return snapshot(stage, StageFrame(0.0, here, level, np.zeros((1, 3)), np.zeros((1, 4)), *goal)).astype(int)
+
+    alone, there = seen(), seen(here)
+    vehicle = (alone != alone[0, 0]).any(axis=2)
+    assert np.ptp(np.nonzero(vehicle)[1]) > 640 / 8
+    assert (alone[vehicle] == there[vehicle]).all(axis=1).mean() > 0.95
+    assert (alone != there).any()
 
 
 def test_a_film_of_a_log_is_written(tmp_path: Path) -> None:

@@ -50,9 +50,10 @@ class BetaflightPlant(Plant):
         from e2efly.validation.bridge_session import Session, rehearsal_settings
         from e2efly.validation.rig import Rig
 
+        program = firmware_program.chosen()
         self.vehicle, self.mode, self._body = vehicle, mode, vehicle
         self._folder = tempfile.TemporaryDirectory(prefix="e2efly-")
-        self._rig = Rig(firmware_program.chosen(), Path(self._folder.name), vehicle)
+        self._rig = Rig(program, Path(self._folder.name), vehicle)
         try:
             self._rig.start()
             self._session = Session(self._rig, rehearsal_settings(HEIGHT_M))

@@ -11,18 +11,21 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from e2efly.config.drawing import Face, Line
+from e2efly.control import Quat
 from e2efly.simulation.scenes.faces import box, cylinder
 from e2efly.simulation.scenes.meshes.engine import needed
 from e2efly.viewing.watch.stage import Source, Stage, StageFrame
 from e2efly.viewing.watch.triangles import (
-    BEHIND,
     GOAL,
+    GRID,
+    GROUND,
     NOSE,
     SKY,
     SLOWEST,
+    TRAIL,
     Mesh,
     Quadrotor,
     face,
@@ -39,15 +42,27 @@ MARGIN = 8
 """Margin around the image of a camera, pixels."""
 SPREAD = 0.55
 """Half the visible height divided by the distance: the tangent of half the vertical field of view."""
-GROUND, GRID = np.array([236, 238, 240]) / 255, np.array([0.72, 0.74, 0.77])
-"""RGB of the ground and of its lines."""
+FINER = 3
+"""Rays along each side of a pixel where edges are."""
 SUN = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])
-CELL, LINE = 1.0, 0.012
-"""Distance and half width of the lines on the ground, m."""
-TRAIL = 90
+CELL, LINE = 0.5, 0.018
+"""Distance and width of the lines on the ground, m."""
+HAZE = 25.0
+"""Distance at which the ground has faded to a third, m."""
+SHADOW = 0.8
+"""Brightness of the ground in the shadow."""
+BACK, RAISED = 4.5, 1.6
+"""Position of the camera behind and above the vehicle, divided by the vehicle's radius."""
+TURN_S = 0.4
+"""Time constant with which the camera turns, s."""
+SLOW = 0.5
+"""Speed from which on the camera looks along the flight rather than along the vehicle's nose, m/s."""
+PAST = 90
 """Number of frames for which the trail is shown."""
-THICK = 0.012
-"""Thickness of a trail and of lines, m."""
+THICK = 0.006
+"""Thickness of lines, m."""
+RING = 1.25
+"""Radius of the ring around a goal, divided by the vehicle's radius."""
 
 
 @dataclass(frozen=True)
@@ -72,44 +87,139 @@ class Soup:
 
 
 def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size: tuple[int, int] = SIZE) -> Any:
-    """The picture, (h, w, 3) uint8, from an eye that looks at a point. World up is up in the picture."""
+    """The picture, (h, w, 3) uint8, from an eye that looks at a point. World up is up in the picture.
+
+    One ray per pixel finds where one thing ends and another begins. These pixels are drawn again with `FINER` squared
+    rays, so that edges are smooth.
+    """
     rows, columns = size
     ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
     right = np.cross(ahead, [0, 0, 1.0])
     right /= max(float(np.linalg.norm(right)), 1e-9)
-    down = np.cross(ahead, right)
-    y, x = np.meshgrid(
-        ((np.arange(rows) + 0.5) / rows * 2 - 1) * SPREAD,
-        ((np.arange(columns) + 0.5) / columns * 2 - 1) * SPREAD * columns / rows,
-        indexing="ij",
-    )
-    ray = (ahead + x[..., None] * right + y[..., None] * down).reshape(-1, 3)
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    seen = np.tile(SKY, (len(ray), 1))
-    far = np.full(len(ray), np.inf)
-    if ground:
-        falls = ray[:, 2] < -1e-4
-        far[falls] = -eye[2] / ray[falls, 2] if eye[2] > 0 else np.inf
-        hit = np.isfinite(far) & (far < 80)
-        place = eye + far[hit, None] * ray[hit]
-        width = np.maximum(LINE, 0.0012 * far[hit])[:, None]
-        on_line = (np.abs((place[:, :2] / CELL + 0.5) % 1 - 0.5) * CELL < width).any(axis=1)
-        haze = np.clip(far[hit] / 60, 0, 1)[:, None]
-        seen[hit] = (1 - haze) * np.where(on_line[:, None], GRID, GROUND) + haze * np.array(SKY)
-    if len(soup.triangles):
-        with needed("mesh"):
-            from e2efly.simulation.scenes.meshes.embree import Embree
-        start = np.broadcast_to(eye, ray.shape).astype(np.float32)
-        distance, index = Embree(soup.triangles.astype(np.float32)).first(start, ray.astype(np.float32))
-        near = (index >= 0) & (distance < far)
+    axes, pixel = np.stack([ahead, right, np.cross(ahead, right)]).astype(np.float32), 2 * SPREAD / rows
+
+    def rays(y: np.ndarray, x: np.ndarray) -> Float[np.ndarray, "n 3"]:
+        """Unit vectors through places in the picture, in pixels from its upper left corner."""
+        way = np.stack([0 * x + 1, (x - columns / 2) * pixel, (y - rows / 2) * pixel], axis=1).astype(np.float32) @ axes
+        return way / np.sqrt(np.einsum("ij,ij->i", way, way))[:, None]
+
+    y, x = (place.ravel() for place in np.mgrid[:rows, :columns])
+    solid = _tree(soup)
+    seen, what = _seen(soup, solid, eye, rays(y + 0.5, x + 0.5), ground, pixel)
+    what, edge = what.reshape(size), np.zeros(size, bool)
+    for axis in (0, 1):
+        differs = np.diff(what, axis=axis) != 0
+        edge |= np.insert(differs, 0, False, axis) | np.insert(differs, differs.shape[axis], False, axis)
+    edge, steps = np.flatnonzero(edge), (np.arange(FINER) + 0.5) / FINER
+    fine = [
+        _seen(soup, solid, eye, rays(y[edge] + down, x[edge] + along), ground, pixel)[0]
+        for down in steps
+        for along in steps
+    ]
+    seen[edge] = np.mean(fine, axis=0)
+    return np.rint(255 * seen).astype(np.uint8).reshape(rows, columns, 3)
+
+
+def _tree(soup: Soup) -> Any:
+    """The triangles, ready for rays. None: there are none."""
+    if not len(soup.triangles):
+        return None
+    with needed("mesh"):
+        from e2efly.simulation.scenes.meshes.embree import Embree
+    return Embree(soup.triangles.astype(np.float32))
+
+
+def _seen(
+    soup: Soup, solid: Any, eye: np.ndarray, ray: Float[np.ndarray, "n 3"], ground: bool, pixel: float
+) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+    """The colours that rays meet, and numbers of what they meet."""
+    seen = np.tile(np.float32(SKY), (len(ray), 1))
+    far, what = np.full(len(ray), np.inf, np.float32), np.full(len(ray), -1)
+    if ground and eye[2] > 0:
+        falls = np.flatnonzero(ray[:, 2] < -1e-4)
+        far[falls] = -eye[2] / ray[falls, 2]
+        place = eye.astype(np.float32) + far[falls, None] * ray[falls]
+        lines = _lines(place[:, :2], far[falls], ray[falls], pixel)[:, None]
+        floor = (1 - lines) * np.float32(GROUND) + lines * np.float32(GRID)
+        what[falls] = -2
+        if solid is not None:
+            dark = np.flatnonzero(solid.blocked(place, np.broadcast_to(SUN, place.shape).astype(np.float32)))
+            floor[dark] *= SHADOW
+            what[falls[dark]] = -3
+        clear = np.exp(-far[falls] / HAZE)[:, None]
+        seen[falls] = clear * floor + (1 - clear) * np.float32(SKY)
+    if solid is not None:
+        distance, index = solid.first(np.broadcast_to(eye, ray.shape).astype(np.float32), ray)
+        near = np.flatnonzero((index >= 0) & (distance < far))
         a, b, c = (soup.triangles[:, i] for i in range(3))
         normal = np.cross(b - a, c - a)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         n = normal[index[near]]
         n = n * -np.sign((n * ray[near]).sum(axis=1, keepdims=True))
-        bright = 0.55 + 0.2 * n[:, 2] + 0.3 * np.maximum(n @ SUN, 0)
+        bright = 0.7 + 0.1 * n[:, 2] + 0.3 * np.maximum(n @ SUN, 0)
         seen[near] = np.clip(soup.colour[index[near]] * bright[:, None], 0, 1)
-    return np.rint(255 * seen).astype(np.uint8).reshape(rows, columns, 3)
+        what[near] = index[near]
+    return seen, what
+
+
+def _lines(
+    place: Float[np.ndarray, "n 2"], far: Float[np.ndarray, " n"], ray: Float[np.ndarray, "n 3"], pixel: float
+) -> Float[np.ndarray, " n"]:
+    """The share of what a pixel sees of the ground that lines cover: their integral over the pixel's footprint.
+
+    A share instead of a point of it, so that no pattern appears where lines are narrower than pixels.
+
+    Args:
+        place: where the rays meet the ground, m.
+        far: length of the rays, m.
+        ray: their directions, unit vectors.
+        pixel: angle of a pixel, rad.
+    """
+    level = np.linalg.norm(ray[:, :2], axis=1)[:, None]
+    along, across = np.abs(ray[:, :2]) / level, np.abs(ray[:, 1::-1]) / level
+    width = pixel * far[:, None] * np.hypot(along / np.abs(ray[:, 2:]), across)
+
+    def covered(x: np.ndarray) -> np.ndarray:
+        cells = np.floor(x / CELL)
+        return LINE * cells + np.minimum(x - CELL * cells, LINE)
+
+    share = (covered(place + (LINE + width) / 2) - covered(place + (LINE - width) / 2)) / width
+    return 1 - (1 - share).prod(axis=1)
+
+
+def behind(
+    position: np.ndarray, heading: Float[np.ndarray, "2"], radius: float, ground: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the camera behind a vehicle is, and the point that it looks at, (3,) m.
+
+    Args:
+        position: position of the vehicle, m.
+        heading: the direction in which the camera looks, level, of any length.
+        radius: radius of the vehicle, m.
+        ground: whether there is ground at height 0, above which the camera stays.
+    """
+    back = heading / max(float(np.linalg.norm(heading)), 1e-9)
+    eye = position + radius * np.array([*(-BACK * back), RAISED])
+    return np.array([*eye[:2], max(eye[2], 0.5 * radius)]) if ground else eye, position
+
+
+def _heading(frame: StageFrame) -> Float[np.ndarray, "2"]:
+    """The direction in which the first vehicle flies, or points if it is slow, level, a unit vector."""
+    yaw = float(Quat.of(frame.quaternion[0]).yaw())
+    way = frame.velocity[0, :2] + SLOW * np.array([np.cos(yaw), np.sin(yaw)])
+    return way / max(float(np.linalg.norm(way)), 1e-9)
+
+
+def snapshot(stage: Stage, frame: StageFrame, size: tuple[int, int] = SIZE) -> UInt8[np.ndarray, "h w 3"]:
+    """The picture of one moment, from behind the first vehicle."""
+    shape, radius = quadrotor(stage.vehicle), _radius(stage)
+    soup = _standing(stage) + _moving(stage, frame.time, np.zeros(3)) + _flying(shape, frame, np.zeros((1, 4)), radius)
+    return picture(soup, *behind(frame.position[0], _heading(frame), radius, stage.ground), stage.ground, size)
+
+
+def _radius(stage: Stage) -> float:
+    """Radius of the vehicle that flies, m."""
+    return float(np.max(stage.vehicle.radius))
 
 
 def beside(seen: UInt8[np.ndarray, "h w 3"], eyes: Mapping[str, np.ndarray]) -> UInt8[np.ndarray, "h v 3"]:
@@ -149,7 +259,8 @@ def film(
     """
     first = source.stage_of(0)
     stage, still, shape = first, _standing(first), quadrotor(first.vehicle)
-    angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=TRAIL), np.zeros(3)
+    angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=PAST), np.zeros(3)
+    heading, follows = np.zeros(2), 1 - np.exp(-source.period / TURN_S)
     flown, due = 0.0, 1 / rate
     while flown < seconds - 1e-9:
         frame = source.step(0)
@@ -159,8 +270,10 @@ def film(
             still, shape = _standing(stage), quadrotor(stage.vehicle)
         if frame.fresh:
             past.clear()
-        here = frame.position[0]
-        eye = here + BEHIND if not past and camera == "orbit" else eye
+        here, radius = frame.position[0], _radius(stage)
+        heading = heading + follows * (_heading(frame) - heading) if past else _heading(frame)
+        from_behind = behind(here, heading, radius, stage.ground)
+        eye = from_behind[0] if not past else eye
         past.append(here.copy())
         angle = (angle + shape.spin * frame.rotor_speed / SLOWEST * source.period) % (2 * np.pi)
         if flown < due - 1e-9:
@@ -170,8 +283,8 @@ def film(
         soup = (
             moved
             + _moving(stage, frame.time, source.origin)
-            + _flying(shape, frame, angle, 0.25 * float(np.max(stage.vehicle.radius)))
-            + _trail(past)
+            + _flying(shape, frame, angle, radius)
+            + _trail(past, 0.03 * radius)
         )
         ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
         match camera:
@@ -180,7 +293,7 @@ def film(
             case "orbit":
                 place = eye, here
             case _:
-                place = here + BEHIND, here
+                place = from_behind
         yield beside(picture(soup, *place, stage.ground, size), frame.images)
 
 
@@ -191,7 +304,7 @@ def _standing(stage: Stage) -> Soup:
         if isinstance(thing, Face):
             meshes.append(face(thing))
         elif isinstance(thing, Line):
-            meshes += _tube(np.asarray(thing.points, float), rgb(thing.color))
+            meshes += _tube(np.asarray(thing.points, float), rgb(thing.color), THICK)
     return Soup.of(meshes)
 
 
@@ -201,8 +314,8 @@ def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
     )
 
 
-def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, goal: float) -> Soup:
-    """The vehicles, and the goal of the first vehicle with the half width `goal`, m."""
+def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, radius: float) -> Soup:
+    """The vehicles, and the goal of the first vehicle: a ring around it, and a ball until the vehicle is there."""
 
     def placed(mesh: Mesh, place: np.ndarray, attitude: np.ndarray) -> Mesh:
         return Mesh(place + turned(attitude[None], mesh.vertices), mesh.faces, mesh.colour)
@@ -211,17 +324,21 @@ def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, goal: float)
     rotors = zip(*spun(shape, frame.position, frame.quaternion, angle), strict=True)
     meshes += [placed(shape.rotor, place, attitude) for place, attitude in rotors]
     if frame.goal is not None and np.isfinite(frame.goal[0]).all():
-        meshes.append(mesh_of(cylinder(goal, goal) + frame.goal[0], GOAL))
+        turn = np.linspace(0, 2 * np.pi, 33)
+        ring = RING * radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        if np.linalg.norm(frame.goal[0] - frame.position[0]) > RING * radius:
+            meshes.append(mesh_of(cylinder(0.15 * radius, 0.15 * radius) + frame.goal[0], GOAL))
+        meshes += _tube(ring + frame.goal[0], GOAL, 0.05 * radius)
     return Soup.of(meshes)
 
 
-def _trail(past: Iterable[np.ndarray]) -> Soup:
+def _trail(past: Iterable[np.ndarray], thick: float) -> Soup:
     points = np.array(list(past))
-    return Soup.of(_tube(points, (0.13, 0.57, 0.55)) if len(points) > 1 else ())
+    return Soup.of(_tube(points, TRAIL, thick) if len(points) > 1 else ())
 
 
-def _tube(points: np.ndarray, colour: tuple[float, float, float]) -> list[Mesh]:
-    """Bars along a curve."""
+def _tube(points: np.ndarray, colour: tuple[float, float, float], thick: float) -> list[Mesh]:
+    """Bars along a curve, of a thickness in m."""
     meshes = []
     for a, b in pairwise(points):
         way = b - a
@@ -232,6 +349,6 @@ def _tube(points: np.ndarray, colour: tuple[float, float, float]) -> list[Mesh]:
         y = np.cross([0, 0, 1.0] if abs(x[2]) < 0.9 else [1.0, 0, 0], x)
         y /= np.linalg.norm(y)
         meshes.append(
-            mesh_of(box([length / 2, THICK / 2, THICK / 2]) @ np.stack([x, y, np.cross(x, y)]) + (a + b) / 2, colour)
+            mesh_of(box([length / 2, thick / 2, thick / 2]) @ np.stack([x, y, np.cross(x, y)]) + (a + b) / 2, colour)
         )
     return meshes

@@ -100,7 +100,7 @@ def read_report(path: Path) -> tuple[list[ShownReport], Vehicle]:
             ended = {place: flights.ending(row) for place, flights in pair.flown.items()}
             name = f"{criterion} {number}: {ended['plant']}"
             flights = tuple(
-                _flight(f"{criterion} {number} {where}: {ended[place]}", begin, pair.flown[place], row)
+                flight_of(f"{criterion} {number} {where}: {ended[place]}", begin, pair.flown[place], row)
                 for place, where in (("plant", f"on {told.plant}"), ("training", "in the training simulator"))
             )
             shown.append(ShownReport(name, criterion, flights, stage(flew.flown.body, suite, scene, number)))
@@ -122,8 +122,8 @@ def _check(path: Path, criteria: Mapping[str, Any], criterion: str, pair: Pair, 
             )
 
 
-def _flight(name: str, begin: Any, flights: Flights, row: int) -> RecordedFlight:
-    """One flight, including its start."""
+def flight_of(name: str, begin: Any, flights: Flights, row: int) -> RecordedFlight:
+    """One flight of a policy, including its start, `begin`: the state of the vehicle."""
     steps = int(flights.length[row])
     time = np.append(0.0, flights.time[:steps])
     period = float(flights.time[0])

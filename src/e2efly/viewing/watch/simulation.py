@@ -47,6 +47,15 @@ def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
     return Stage(vehicle, solids, [thing for thing in drawn if not (solids and isinstance(thing, Face))])  # or twice
 
 
+def moment(env: Env, task: TaskConfig, state: EnvState, row: int) -> tuple[Stage, StageFrame]:
+    """One vehicle of a batch in its world, to be drawn."""
+    s, goal = state.vehicle, env.task.goal(state.memory, state.time)
+    there = (s.position, s.quaternion, s.velocity, s.rotor_speed, goal)
+    position, quaternion, velocity, rotor_speed, aim = (np.asarray(x[row], float)[None] for x in there)
+    frame = StageFrame(float(state.time[row]), position, quaternion, velocity, rotor_speed, aim)
+    return stage(env.physics.flown, task, env.task.scene(state.memory), row), frame
+
+
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Hands:

@@ -10,14 +10,16 @@ from e2efly.config.drawing import Face
 from e2efly.simulation.scenes.faces import Quads, box, cylinder
 from e2efly.vehicles.vehicle import Vehicle
 
-DARK, FRONT, METAL = (0.16, 0.17, 0.2), (0.93, 0.45, 0.13), (0.55, 0.57, 0.6)
-"""RGB of body and rear arms, of the arms in front, and of motors."""
-BLADE = (0.25, 0.28, 0.33)
+DARK, FRONT, METAL = (0.22, 0.26, 0.31), (0.94, 0.48, 0.17), (0.36, 0.42, 0.49)
+"""RGB of body and rear arms, of the arms in front, and of motors. All colours here are those of the page's bright style
+(`web/assets/page.css`).
+"""
+BLADE = METAL
 """RGB of rotors."""
-GOAL = FRONT
-"""RGB of goals."""
-SKY = (0.87, 0.9, 0.93)
-"""RGB of the background."""
+GOAL, TRAIL = (0.11, 0.46, 0.82), (0.89, 0.33, 0.18)
+"""RGB of goals and of trails."""
+SKY, GROUND, GRID = (0.91, 0.93, 0.96), (0.85, 0.87, 0.91), (0.68, 0.74, 0.8)
+"""RGB of the background, the ground, and the lines on it."""
 SLOWEST = 40.0
 """Factor by which rotors are drawn slower than they turn. At full speed they would seem to stand still."""
 BEHIND = np.array([-1.1, -1.1, 0.6])

@@ -17,6 +17,8 @@ from e2efly.viewing.watch.stage import Stage, StageFrame
 from e2efly.viewing.watch.triangles import (
     BEHIND,
     GOAL,
+    GRID,
+    GROUND,
     NOSE,
     SKY,
     SLOWEST,
@@ -156,8 +158,8 @@ class Viewer:
         if stage.ground:
             self._scene.add_grid(
                 "/world/task/stage/ground", 60.0, 60.0, cell_size=0.5, section_size=5.0, fade_distance=45.0,
-                plane_color=(236, 238, 240), plane_opacity=1.0, cell_color=(214, 217, 221),
-                section_color=(180, 184, 190), position=(0.0, 0.0, -0.002),
+                plane_color=_rgb(GROUND), plane_opacity=1.0, cell_color=_rgb(GRID),
+                section_color=_rgb(GRID), position=(0.0, 0.0, -0.002),
             )  # fmt: skip
         self._moving = []
         still: dict[tuple[float, ...], list[np.ndarray]] = {}
