@@ -102,12 +102,7 @@ class Live:
         images: Sequence[Image] = (),
         say: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Start the processes.
-
-        Args:
-            targets: where to publish.
-            images: the images that the policy sees.
-            say: called once for each process that ends in flight. It must not block.
+        """Start the processes. `say` is called once for each process that ends in flight. It must not block.
 
         Raises:
             ValueError: naming the target that does not open, why, and what to do.
@@ -197,10 +192,8 @@ class _Shown:
 
 
 def optical(pitch: float) -> list[float]:
-    """The optical frame of a camera (x right, y down, z ahead) in the body frame, wxyz.
-
-    Args:
-        pitch: pitch of the camera, downwards from straight ahead, rad.
+    """The optical frame of a camera (x right, y down, z ahead) in the body frame, wxyz. `pitch` is that of the camera,
+    downwards from straight ahead, rad.
     """
     down = Quat(math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0)
     return [float(part) for part in down.compose(Quat(0.5, -0.5, 0.5, -0.5)).stack()]

@@ -93,11 +93,6 @@ def hover_schedule(hover: HoverController) -> dict[int, float]:
 def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None:
     """Refuse a hover controller that needs telemetry that the flight controller does not report.
 
-    Args:
-        name: the name of the hover controller.
-        hover: the hover controller.
-        info: the settings of the flight controller.
-
     Raises:
         ValueError: telemetry is missing. The message names it, and what is accepted.
     """

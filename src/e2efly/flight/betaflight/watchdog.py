@@ -112,12 +112,8 @@ class DescentPlan:
 
 
 def descent(plan: DescentPlan, elapsed: float, attitude: Attitude | None) -> list[int]:
-    """The channels of a take-over without an accelerometer, us.
-
-    Args:
-        plan: the last plan of the bridge.
-        elapsed: time since the take-over, s.
-        attitude: the newest attitude of the controller. None: unknown; the body rates are zero.
+    """The channels of a take-over without an accelerometer, us. `elapsed` is the time since the take-over, s. If the
+    controller's attitude is unknown, the body rates are zero.
     """
     times = [at for at, _ in plan.throttle]
     return _channels(plan, plan.throttle[max(bisect_right(times, elapsed) - 1, 0)][1], attitude)

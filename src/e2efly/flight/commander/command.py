@@ -113,12 +113,8 @@ class Limits:
 
 
 def within(limits: Limits, command: Command, odometry: Odometry | None) -> Command:
-    """The command, with its numbers clipped to the vehicle's limits like those of a policy.
-
-    Args:
-        limits: the limits of the flight.
-        command: the command as it arrived.
-        odometry: the motion of the vehicle. None: not known, and distances are not checked.
+    """The command, with its numbers clipped to the vehicle's limits like those of a policy. If the motion of the
+    vehicle is not known (None), distances are not checked.
 
     Raises:
         ValueError: for a number far beyond the limits, or a position outside the fence or far from the vehicle. It

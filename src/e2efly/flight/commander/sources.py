@@ -19,10 +19,7 @@ FORMS = (
 
 
 def open_commands(text: str) -> CommandSource:
-    """Open a source of commands.
-
-    Args:
-        text: a text as `FORMS` says. Without a HOST, it listens at 127.0.0.1.
+    """Open a source of commands, given as `FORMS` says. Without a HOST, it listens at 127.0.0.1.
 
     Raises:
         ValueError: naming the text and what is accepted. Also for a port that is taken. For a package that is not

@@ -33,15 +33,8 @@ class FilterError(Exception):
 def keep(
     filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
 ) -> tuple[Ctbr, CommandChange | None]:
-    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits.
-
-    Args:
-        filter: the filter for this vehicle and fence.
-        memory: the memory after `watch`.
-        odometry: the newest odometry.
-        now: s.
-        wanted: the command of the policy.
-        floor: whether the lowest height of the fence counts.
+    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits. `memory`
+    is that after `watch`. `now` is in s. `floor` tells whether the lowest height of the fence counts.
 
     Raises:
         FilterError: if a number is not finite.

@@ -22,11 +22,7 @@ def forms() -> str:
 
 
 def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
-    """The cameras of a policy, in the order of its contract.
-
-    Args:
-        texts: NAME=URI for each of its images.
-        contract: the contract of the policy.
+    """The cameras of a policy, in the order of its contract. `texts` has NAME=URI for each of its images.
 
     Raises:
         ValueError: naming the image or the text and what is accepted.
