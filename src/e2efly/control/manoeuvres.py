@@ -164,16 +164,10 @@ def excite(
     time: float,
     motion: Motion,
 ) -> tuple[ManoeuvreProgress, Ctbr]:
-    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure.
-
-    Args:
-        vehicle: the vehicle whose gains are used to steer.
-        room: the space in which to stay.
-        speed: speed of the fastest line, m/s.
-        duration: duration of the whole flight, s.
-        before: the state from `Progress.begin` or from the last step.
-        time: time since the beginning, s.
-        motion: motion of the vehicle.
+    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure. The
+    gains of `vehicle` are used to steer. `speed` is that of the fastest line, m/s. `duration` is that of the whole
+    flight, and `time` the time since its beginning, s. `before` is the state from `Progress.begin` or from the last
+    step.
 
     Returns:
         The state for the next step, and the command.

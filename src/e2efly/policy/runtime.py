@@ -181,15 +181,9 @@ def check(
     imu: bool = False,
     images: bool = False,
 ) -> tuple[str, ...]:
-    """The reasons why a policy cannot fly here. Empty: it can.
-
-    Args:
-        contract: the contract of the policy.
-        vehicle: the vehicle that flies.
-        shown: the task's own fields of the observation.
-        control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
-        imu: whether IMU measurements are available.
-        images: whether the images that the contract asks for are available.
+    """The reasons why a policy cannot fly here. Empty: it can. `shown` has the task's own fields of the observation.
+    `control_rate` is the rate at which the policy will be called, Hz. None: the rate of its training. `imu` and
+    `images` tell whether IMU measurements and the images that the contract asks for are available.
     """
     reasons = list(contract.refusals(vehicle, control_rate))
     if contract.action.mode not in MODES:

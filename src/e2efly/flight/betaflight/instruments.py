@@ -98,13 +98,9 @@ class Instruments:
     """Those of the last message."""
 
     def read(self, now: float, info: ControllerInfo, *, land: bool, sends: bool = True) -> Reading:
-        """Evaluate the replies that have come until `now`.
-
-        Args:
-            now: s on the client's clock.
-            info: the settings of the controller, which are needed to decode the active modes.
-            land: the operator asks for a landing, as the pilot does with the mission switch.
-            sends: sticks are sent. While they are not, or have no effect, ANGLE is on, as it should be.
+        """Evaluate the replies that have come until `now`. `now` is in s on the client's clock. The settings of the
+        controller are needed to decode the active modes. `land`: the operator asks for a landing, as the pilot does
+        with the mission switch. While sticks are not sent, or have no effect, ANGLE is on, as it should be.
         """
         fresh = self._fresh()
         if (battery := fresh.get(BatteryState.CODE)) is not None:

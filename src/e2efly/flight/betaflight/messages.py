@@ -248,10 +248,8 @@ class BatteryState:
 def set_raw_rc(channels: Sequence[int]) -> MspFrame:
     """The frame that sends the receiver's channels to the controller.
 
-    The controller sets channels that are left out to 0, which is not a valid pulse.
-
-    Args:
-        channels: µs, in the receiver's order, which `RxMap` maps. At least 4, at most `MAX_CHANNELS`.
+    Channels are in µs, in the receiver's order, which `RxMap` maps: at least 4, at most `MAX_CHANNELS`. The controller
+    sets channels that are left out to 0, which is not a valid pulse.
 
     Raises:
         ValueError: a channel, or the number of channels, is not valid. The message names it and what is accepted.

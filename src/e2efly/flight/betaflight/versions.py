@@ -106,12 +106,8 @@ def version_text(version: tuple[int, int, int]) -> str:
 
 
 def release_of(api: tuple[int, int], version: tuple[int, int, int], text: str = "") -> Release:
-    """The release that a controller reports.
-
-    Args:
-        api: its MSP version.
-        version: its FC_VERSION.
-        text: the version as the firmware writes it. Empty: the firmware does not write it.
+    """The release that a controller reports. `api` is its MSP version, and `version` its FC_VERSION. `text` is the
+    version as the firmware writes it. Empty: the firmware does not write it.
 
     Raises:
         ValueError: the release is not known. The message names it, the known releases, and what to do.

@@ -142,11 +142,8 @@ class WatchedLink:
     """
 
     def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
-        """Start the process.
-
-        Args:
-            target: the text of the link, as for `open_link`.
-            timeout: silence of the bridge in flight after which the process takes over, s.
+        """Start the process. `target` is the text of the link, as for `open_link`. `timeout` is the silence of the
+        bridge in flight after which the process takes over, s.
         """
         open_link(target)  # raises here for a bad target; nothing is opened before the first poll
         self.connections, self.reason = 0, "not polled yet"
@@ -304,13 +301,9 @@ def land(link: Link, plan: DescentPlan, held: bytes = b"", age: float = 0.0) -> 
     The closed throttle must be sent all the time. Some controllers return the control to the receiver when they hear no
     override any more, and the throttle stick, which rests in its middle, would then control the motors.
 
-    While the link is gone, the controller holds what it got last, and the descent does not go on.
-
-    Args:
-        link: the link to the controller.
-        plan: the last plan of the bridge.
-        held: the last stick frame of the bridge, which the controller has held since.
-        age: how old the plan is, s.
+    While the link is gone, the controller holds what it got last, and the descent does not go on. `plan` is the last
+    plan of the bridge, and `age` how old it is, s. `held` is the last stick frame of the bridge, which the controller
+    has held since.
     """
     decoder, attitude, levelled, disarmed, rounds = Decoder(), None, time.monotonic(), 0, 0
     sense, down = plan.sense, plan.throttle[-1][0]

@@ -62,12 +62,8 @@ class Command:
 
 
 def parse_command(message: bytes, received: float, sender: str = "") -> Command:
-    """Read one message.
-
-    Args:
-        message: a JSON object in UTF-8; see `docs/commands.md`.
-        received: time of arrival, s on the local monotonic clock.
-        sender: address of the sender.
+    """Read one message. It is a JSON object in UTF-8; see `docs/commands.md`. `received` is the time of its arrival, s
+    on the local monotonic clock, and `sender` the address of the sender.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.

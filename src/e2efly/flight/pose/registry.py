@@ -33,11 +33,8 @@ class MalformedError(ValueError):
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens a pose source, given the text after its name.
-
-    Args:
-        name: the name in `e2efly fly --pose NAME:...`.
-        form: how the whole text is written, for people.
+    """Register a function or a class that opens a pose source, given the text after its name. `name` stands in `e2efly
+    fly --pose NAME:...`. `form` is how the whole text is written, for people.
 
     Raises:
         ValueError: if the name is taken.

@@ -36,14 +36,8 @@ def colours(image: np.ndarray, camera: Image) -> np.ndarray:
 
 
 def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
-    """A picture with others of the same size to its right, in two rows, after a gap.
-
-    Args:
-        shown: (h, w, 3) uint8.
-        others: (h, w, 3) uint8 each. If empty, the result is the picture alone.
-
-    Returns:
-        (h or 2 h, ..., 3) uint8. The picture is in the upper left.
+    """A picture with others of the same size to its right, in two rows, after a gap. All are (h, w, 3) uint8. The
+    result is (h or 2 h, ..., 3) uint8, with the picture in the upper left. Without others, it is the picture alone.
     """
     if not len(others):
         return shown

@@ -23,11 +23,8 @@ F = TypeVar("F", bound=Opener)
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens an image source, given the text after its name and the camera.
-
-    Args:
-        name: the name in `e2efly fly --image IMAGE=NAME:...`.
-        form: how the whole text is written, for people.
+    """Register a function or a class that opens an image source, given the text after its name and the camera. `name`
+    stands in `e2efly fly --image IMAGE=NAME:...`. `form` is how the whole text is written, for people.
 
     Raises:
         ValueError: if the name is taken.

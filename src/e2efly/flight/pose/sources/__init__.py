@@ -11,12 +11,9 @@ for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
 
 
 def open_source(text: str) -> PoseSource:
-    """Open a pose source.
-
-    Args:
-        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
-            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
-            that it is given.
+    """Open a pose source: NAME:... of a registered kind, also of an installed package, written as its form says. Or a
+    reference to a class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and
+    the text that it is given.
 
     Raises:
         ValueError: naming the text and what is accepted. Also for a port that is taken or a host without an address.

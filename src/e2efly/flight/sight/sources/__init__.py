@@ -66,13 +66,9 @@ def by_image(texts: Sequence[str], contract: Contract) -> dict[str, str]:
 
 
 def open_image(text: str, image: Image) -> ImageSource:
-    """Open an image source.
-
-    Args:
-        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
-            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
-            that it is given.
-        image: the camera of the policy's contract.
+    """Open an image source: NAME:... of a registered kind, also of an installed package, written as its form says. Or a
+    reference to a class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and
+    the text that it is given. `image` is the camera of the policy's contract.
 
     Raises:
         ValueError: naming the text and what is accepted, or with what the source reports about its failure.
