@@ -96,19 +96,14 @@ def _target(text: str) -> PublishTarget:
 class Live:
     """A `Log` that several processes publish. Only the first method waits for them or raises."""
 
-    def __init__(
-        self,
-        targets: Sequence[PublishTarget],
-        images: Sequence[Image] = (),
-        say: Callable[[str], None] = lambda line: None,
-    ) -> None:
-        """Start the processes. `say` is called once for each process that ends in flight. It must not block.
+    def __init__(self, targets: Sequence[PublishTarget], images: Sequence[Image] = ()) -> None:
+        """Start the processes.
 
         Raises:
             ValueError: naming the target that does not open, why, and what to do.
         """
-        self.say = say
-        """May be set later."""
+        self.say: Callable[[str], None] = lambda line: None
+        """Called once for each process that ends in flight. It must not block. Set it before the flight."""
         self.outlets: list[Outlet] = []
         images = images if targets else ()
         self._images = opened = tuple(_Shown.of(image, i) for i, image in enumerate(images))

@@ -18,8 +18,6 @@ LEVEL_RATE = 3.0
 """The largest body rate in a blind descent, rad/s."""
 SINK_SPEED, SINK_ACCELERATION = 0.55, 3.0
 """A blind descent first reaches this speed, m/s, with this acceleration, m/s^2 ..."""
-SINK_TIME = SINK_SPEED / SINK_ACCELERATION
-"""... which takes this time from rest, s ..."""
 SINK_THRUST = 0.95
 """... and then continues with this share of the weight. It must sink, whatever the last error of the throttle map."""
 SINK_FASTER = 0.2

@@ -75,11 +75,3 @@ def settled(fit: Slope, rate: float) -> bool:
     constant.
     """
     return fit.count >= 3 and fit.last - fit.first >= 2 / rate
-
-
-def noise_gain(rate: float, interval: float) -> float:
-    """Standard deviation of the slope, u/s, for white noise with a standard deviation of 1 u in samples every
-    `interval` s.
-    """
-    b = math.exp(-rate * interval)
-    return math.sqrt(2 * ((1 - b) / (1 + b)) ** 3) / interval
