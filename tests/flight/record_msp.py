@@ -25,10 +25,10 @@ from typing import Any
 from e2efly.flight.betaflight.client import MESSAGES, Client, ask, tell
 from e2efly.flight.betaflight.codec import Decoder, MspFrame, encode
 from e2efly.flight.betaflight.link import open_link
-from e2efly.flight.betaflight.messages import Debug, Rc, set_raw_rc
+from e2efly.flight.betaflight.messages import Rc, set_raw_rc
 
 GOLDEN = Path(__file__).parents[1] / "data" / "msp_golden.json"
-SET_RC_TUNING, SET_RC_DEADBAND = 204, 218
+SET_RC_TUNING, SET_RC_DEADBAND, DEBUG = 204, 218, 254
 SETTINGS = [
     "set craft_name = golden one",
     "set debug_mode = RC_INTERPOLATION",
@@ -154,7 +154,7 @@ def setpoints(client: Client, channels: tuple[int, ...]) -> list[int]:
             time.sleep(0.01)
         pulses = ask(client, Rc.CODE, 10.0).channels
         if pulses[:4] == (channels[1], channels[2], channels[3], channels[0]):  # not failsafe's
-            seen.append(ask(client, Debug.CODE, 10.0).values)
+            seen.append(struct.unpack_from("<4h", ask(client, DEBUG, 10.0)))
     return list(seen[-1])
 
 

@@ -62,7 +62,7 @@ def test_without_a_channel_of_angle_the_sticks_alone_are_looked_for() -> None:
 @pytest.mark.parametrize("sends", [True, False])
 def test_angle_meddles_only_while_sticks_are_sent(sends: bool) -> None:
     """`--check` sends none: ANGLE is on then, as it is to be."""
-    status = StatusEx(1e-3, frozenset(), 0b111, 0.0, 0, 0, (), False)
+    status = StatusEx(1e-3, 0b111, 0.0, 0, ())
     link = SimpleNamespace(alive=True, reason="")
     client: Any = SimpleNamespace(
         latest={}, latency=0.0, link=link, message=lambda code, now, age: status if code == StatusEx.CODE else None

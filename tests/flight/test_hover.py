@@ -13,7 +13,6 @@ from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.hover import (
     LEVEL_RATE,
     SINK_SPEED,
-    SINK_TIME,
     FlightMotion,
     blind,
     blind_time,
@@ -150,7 +149,7 @@ def test_blind_a_climb_is_ended_and_a_fall_is_caught(climb: float) -> None:
 
 
 def test_blind_without_an_attitude_the_rates_are_zero() -> None:
-    first, later = blind(None, 0.0), blind(None, SINK_TIME + 0.01)
+    first, later = blind(None, 0.0), blind(None, sink_time() + 0.01)
     for command in (first, later):
         assert (command.rate.x, command.rate.y, command.rate.z) == (0, 0, 0)
     assert first.thrust < later.thrust < GRAVITY

@@ -48,7 +48,7 @@ class Bench:
     ) -> Reading:
         self.now += 0.033
         boxes = sum(1 << BOXES.index(box) for box in on)
-        status = StatusEx(1e-3, frozenset(), boxes, 0.1, 0, rates, disabled, False)
+        status = StatusEx(1e-3, boxes, 0.1, rates, disabled)
         sticks = [1500] * 7 + [mission, roll, 1500, 1500, 1500]
         for code, message in ((StatusEx.CODE, status), (Rc.CODE, Rc(tuple(sticks[:channels])))):
             self.client.latest[code] = Reply(message, self.now, 0.005)

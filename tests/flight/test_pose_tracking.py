@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from e2efly.flight.pose.conditions import REASONS, Checks
-from e2efly.flight.pose.slope import follow_slope, noise_gain, slope, start_slope
+from e2efly.flight.pose.slope import follow_slope, slope, start_slope
 from e2efly.flight.pose.tracking import PoseTrack, age, rotation_between, track
 from e2efly.policy.odometry import Odometry, Sample
 
@@ -287,6 +287,12 @@ def test_the_slope_of_a_line_is_exact_at_any_times(intervals: list[float], speed
         time += interval
         fit = follow_slope(fit, rate, time, np.array([speed * (time - 1e5)]))
     assert slope(fit)[0] == pytest.approx(speed, abs=1e-6)
+
+
+def noise_gain(rate: float, interval: float) -> float:
+    """What the module `slope` states of white noise."""
+    b = math.exp(-rate * interval)
+    return math.sqrt(2 * ((1 - b) / (1 + b)) ** 3) / interval
 
 
 def test_the_noise_of_the_slope_is_as_stated() -> None:

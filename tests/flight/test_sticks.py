@@ -35,7 +35,7 @@ def recorded() -> ControllerInfo:
         rx_fail=read(settings_messages.RxFailConfig),
         modes=mode_slots.mode_ranges(read(mode_slots.ModeRanges), read(mode_slots.ModeLogic)),
         box_ids=read(mode_slots.BoxIds).ids, motor=read(settings_messages.MotorConfig),
-        advanced=read(settings_messages.AdvancedConfig), pid_advanced=read(settings_messages.PidAdvanced),
+        pid_advanced=read(settings_messages.PidAdvanced),
         mixer=read(settings_messages.MixerConfig),
         alignment=read(settings_messages.BoardAlignment),
     )  # fmt: skip

@@ -55,11 +55,8 @@ _LINES = np.array([
 
 
 def lines(time: float, speed: float) -> np.ndarray:
-    """The velocity to fly at, world, m/s, (3,): in both directions along the axes and the diagonals.
-
-    Args:
-        time: time since the beginning, s.
-        speed: speed of the fastest line, m/s.
+    """The velocity to fly at, world, m/s, (3,): in both directions along the axes and the diagonals. `time` is that
+    since the beginning, s, and `speed` that of the fastest line, m/s.
     """
     return speed * _LINES[int(time / LEG) % len(_LINES)]
 
@@ -79,11 +76,8 @@ def doublets(time: float) -> tuple[np.ndarray, float]:
 
 
 def softened(vehicle: Vehicle, tilt: float = TILT) -> Vehicle:
-    """A vehicle with gains that can steer a vehicle that is not known.
-
-    Args:
-        vehicle: the vehicle whose gains are used where they are lower.
-        tilt: largest tilt for steering, rad.
+    """A vehicle with gains that can steer a vehicle that is not known. The gains of `vehicle` are used where they are
+    lower. `tilt` is the largest tilt for steering, rad.
     """
     return dataclasses.replace(
         vehicle,
@@ -170,16 +164,10 @@ def excite(
     time: float,
     motion: Motion,
 ) -> tuple[ManoeuvreProgress, Ctbr]:
-    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure.
-
-    Args:
-        vehicle: the vehicle whose gains are used to steer.
-        room: the space in which to stay.
-        speed: speed of the fastest line, m/s.
-        duration: duration of the whole flight, s.
-        before: the state from `Progress.begin` or from the last step.
-        time: time since the beginning, s.
-        motion: motion of the vehicle.
+    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure. The
+    gains of `vehicle` are used to steer. `speed` is that of the fastest line, m/s. `duration` is that of the whole
+    flight, and `time` the time since its beginning, s. `before` is the state from `Progress.begin` or from the last
+    step.
 
     Returns:
         The state for the next step, and the command.
@@ -221,11 +209,9 @@ def kick_for(vehicle: Vehicle, room: ManoeuvreRoom) -> float:
 
 
 def kicks(time: float, height: float) -> float:
-    """Addition to the thrust over mass, m/s^2: up for `PULSE` seconds, then down until the climb is undone.
-
-    Args:
-        time: time since the kicks began, s. The first kick comes after a third of `KICK_EVERY`.
-        height: size of a kick, m/s^2.
+    """Addition to the thrust over mass, m/s^2: up for `PULSE` seconds, then down until the climb is undone. `time` is
+    that since the kicks began, s. The first kick comes after a third of `KICK_EVERY`. `height` is the size of a kick,
+    m/s^2.
     """
     phase = (time + 2 * KICK_EVERY / 3) % KICK_EVERY
     if time < KICK_EVERY / 3:
@@ -237,10 +223,7 @@ def chirps(time: float, duration: float) -> tuple[np.ndarray, float]:
     """Additions to the command: body rates, rad/s, (3,), and thrust over mass, m/s^2.
 
     They are sines whose frequency rises linearly over `SWEEP`, for roll, pitch, yaw and thrust, one after the other.
-
-    Args:
-        time: time since the first chirp began, s.
-        duration: duration of the four chirps together, s.
+    `time` is that since the first chirp began, and `duration` that of the four chirps together, s.
     """
     each = duration / 4
     which, at = min(int(time / each), 3), time % each

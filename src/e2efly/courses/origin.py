@@ -48,11 +48,8 @@ class Origin:
         """The origin that best maps points of the course to their measured positions in the room, by least squares.
 
         Both have z up, so only a rotation about z and a shift are fitted: B. K. P. Horn, "Closed-form solution of
-        absolute orientation using unit quaternions", 1987, for a rotation in the plane.
-
-        Args:
-            room: (n, 3) positions measured in the room, m.
-            course: (n, 3) the same points in the course's world, m.
+        absolute orientation using unit quaternions", 1987, for a rotation in the plane. Both are (n, 3), m: `room` as
+        measured in the room, and `course` the same points in the course's world.
 
         Raises:
             ValueError: for fewer than three points, for points on a line, and for a residual above `RESIDUAL`.

@@ -69,11 +69,7 @@ is nearer to the next one than `CLEAR`."""
 
 
 def random_tracks(u: Any) -> Tracks:
-    """Random tracks for n worlds.
-
-    Args:
-        u: (n, CANDIDATES, NUMBERS) uniform in [0, 1).
-    """
+    """Random tracks for n worlds. `u` is (n, CANDIDATES, NUMBERS), uniform in [0, 1)."""
     xp = u.__array_namespace__()
     candidates = _candidates(u)
     best = xp.argmax(xp.minimum(_clearance(candidates), CLEAR), axis=1)

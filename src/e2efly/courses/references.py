@@ -141,11 +141,9 @@ class Lissajous:
         return Lissajous(half_length, half_length / 2, 2.0, 0.0, speed / (half_length * math.sqrt(2.0)))
 
     def phase(self, centre: Any, start: Any) -> Any:
-        """The phases p in [-pi, pi], (n,), rad, of the curves about `centre` (3,), m, with these first knots.
-
-        Args:
-            centre: centre of all curves.
-            start: (n, 3, 3) the first knot of each: position, m; velocity, m/s; acceleration, m/s^2.
+        """The phases p in [-pi, pi], (n,), rad, of the curves about `centre` (3,), m, with these first knots. `centre`,
+        (3,), m, is that of all curves. `start` is (n, 3, 3), the first knot of each: position, m; velocity, m/s;
+        acceleration, m/s^2.
         """
         xp = start.__array_namespace__()
         away = (start[:, 0] - xp.asarray(centre)) / self.half_x

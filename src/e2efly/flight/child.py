@@ -32,13 +32,8 @@ class Child:
     """One script. Reading from it needs no thread, and needs none of the script's packages in this process."""
 
     def __init__(self, python: str, script: str, *arguments: str, seconds: float | None = None) -> None:
-        """Start the script and wait until it is ready.
-
-        Args:
-            python: the interpreter that has the package that the script needs.
-            script: file name of a script in `SCRIPTS`.
-            arguments: arguments of the script.
-            seconds: the longest time until it is ready. None: `OPENING`.
+        """Start the script and wait until it is ready. The interpreter has the package that the script needs. `script`
+        is the file name of one in `SCRIPTS`. `seconds` is the longest time until it is ready. None: `OPENING`.
 
         Raises:
             ValueError: with what the script reports about its failure, or because it does not answer in time.

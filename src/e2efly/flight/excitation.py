@@ -98,15 +98,9 @@ class Excitation:
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray] = (), memory: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The action for an observation, and the memory for the next call.
-
-        Args:
-            observation: (o,) as `contract.observation` defines it.
-            images: not used.
-            memory: what the last call returned. None: the flight begins here.
-
-        Returns:
-            The action, float32 (4,) in [-1, 1], and the memory for the next call, float64 (memory_size,).
+        """The action for an observation, and the memory for the next call. The observation is (o,) as
+        `contract.observation` defines it. `images` are not used. At the beginning of a flight, there is no memory. The
+        action is float32 (4,) in [-1, 1], and the memory float64 (memory_size,).
 
         Raises:
             ValueError: if the observation has a number that is not finite.
@@ -130,13 +124,8 @@ class Excitation:
 def excitation(
     vehicle: Vehicle, settings: FlightSettings, options: ExcitationOptions, latency: float | None = None
 ) -> tuple[Excitation, Course]:
-    """An excitation flight inside a fence, and its course, for `Runtime.of`.
-
-    Args:
-        vehicle: the loaded vehicle that the bridge uses.
-        settings: the flight's settings, for its fence and the height of the ground.
-        options: the options of the excitation flight.
-        latency: the time from the vehicle's motion to its rate loop, s. None: the value of the vehicle file.
+    """An excitation flight inside a fence, and its course, for `Runtime.of`. `latency` is the time from the vehicle's
+    motion to its rate loop, s. None: the value of the vehicle file.
 
     Raises:
         ValueError: naming the option, or the part of the fence that is too small, and what is needed.

@@ -12,12 +12,8 @@ class Lines:
         self._skip = False
 
     def feed(self, data: bytes, most: int | None = None) -> tuple[list[bytes], int, int]:
-        """The complete non-empty lines, the number of lines dropped as too long, and the number dropped as too many.
-
-        Args:
-            data: the next bytes of the stream.
-            most: the largest number of complete lines to split off. If there are more, the newest are kept and the
-                others are only counted. None: no limit.
+        """The complete non-empty lines, the number of lines dropped as too long, and the number dropped as too many. If
+        there are more complete lines than `most`, the newest are kept and the others are only counted. None: no limit.
         """
         *lines, rest = (self._rest + data).rsplit(b"\n", -1 if most is None else most + 1)
         dropped = 0

@@ -25,12 +25,8 @@ class Outlet:
     """One process. `send` takes some microseconds, even if the process stands still, is killed or is slow."""
 
     def __init__(self, name: str, python: str, config: dict[str, Any]) -> None:
-        """Start the process and wait until it is ready.
-
-        Args:
-            name: the name of the process in messages.
-            python: the interpreter that has the package that the process needs.
-            config: the configuration for `scripts/live.py`.
+        """Start the process and wait until it is ready. The interpreter has the package that the process needs. `name`
+        is the name of the process in messages, and `config` the configuration for `scripts/live.py`.
 
         Raises:
             ValueError: with what the process reports about its failure, or because it does not answer in time.

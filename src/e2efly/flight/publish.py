@@ -96,24 +96,14 @@ def _target(text: str) -> PublishTarget:
 class Live:
     """A `Log` that several processes publish. Only the first method waits for them or raises."""
 
-    def __init__(
-        self,
-        targets: Sequence[PublishTarget],
-        images: Sequence[Image] = (),
-        say: Callable[[str], None] = lambda line: None,
-    ) -> None:
+    def __init__(self, targets: Sequence[PublishTarget], images: Sequence[Image] = ()) -> None:
         """Start the processes.
-
-        Args:
-            targets: where to publish.
-            images: the images that the policy sees.
-            say: called once for each process that ends in flight. It must not block.
 
         Raises:
             ValueError: naming the target that does not open, why, and what to do.
         """
-        self.say = say
-        """May be set later."""
+        self.say: Callable[[str], None] = lambda line: None
+        """Called once for each process that ends in flight. It must not block. Set it before the flight."""
         self.outlets: list[Outlet] = []
         images = images if targets else ()
         self._images = opened = tuple(_Shown.of(image, i) for i, image in enumerate(images))
@@ -197,10 +187,8 @@ class _Shown:
 
 
 def optical(pitch: float) -> list[float]:
-    """The optical frame of a camera (x right, y down, z ahead) in the body frame, wxyz.
-
-    Args:
-        pitch: pitch of the camera, downwards from straight ahead, rad.
+    """The optical frame of a camera (x right, y down, z ahead) in the body frame, wxyz. `pitch` is that of the camera,
+    downwards from straight ahead, rad.
     """
     down = Quat(math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0)
     return [float(part) for part in down.compose(Quat(0.5, -0.5, 0.5, -0.5)).stack()]

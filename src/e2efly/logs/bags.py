@@ -14,12 +14,8 @@ from e2efly.logs.scripts.ros_topics import TOPICS, Topic, Tree
 
 
 def export_bag(log: FlightLog, path: str | Path, version: int) -> dict[str, int]:
-    """Write a flight log as a bag.
-
-    Args:
-        log: a log from `read_log`.
-        path: a new file ending in `.bag` (version 1), or a new folder (version 2: sqlite3 storage).
-        version: the version of ROS, 1 or 2.
+    """Write a flight log as a bag. `log` is a log from `read_log`. `path` is a new file ending in `.bag` for ROS 1, or
+    a new folder for ROS 2 (sqlite3 storage).
 
     Returns:
         Number of messages written, by topic.

@@ -208,12 +208,7 @@ def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> LogClock:
 
     The windows with the most motion are searched for in the whole flight. From the best match, the neighbouring windows
     are followed outwards with small shifts only. The clocks may therefore run at different and changing rates. SITL's
-    clock does, by some percent.
-
-    Args:
-        time: (n,) s, increasing, from the flight log.
-        gyro: (n, 3) rad/s, from the flight log.
-        blackbox: the session.
+    clock does, by some percent. The flight log has the gyro, (n, 3) rad/s, at the increasing times (n,), s.
 
     Raises:
         ValueError: if either has less than `WINDOW` of gyro data, or if they agree nowhere.

@@ -28,11 +28,7 @@ ALIKE = 0.3
 
 
 def with_blackboxes(records: Sequence[Record]) -> list[Record]:
-    """The flights, with the blackboxes of the same flights merged into them. Other blackboxes remain separate flights.
-
-    Args:
-        records: the records as read.
-    """
+    """The flights, with the blackboxes of the same flights merged into them. Other blackboxes stay separate."""
     found = dict(enumerate(records))
     boxes = [i for i, r in found.items() if r.kind == BLACKBOX and r.has("body_rate")]
     flights = [i for i, r in found.items() if i not in boxes and r.has("body_rate", "command")]

@@ -39,11 +39,7 @@ class Expander:
     """Expands the compressed blocks of one file, within the budget that its size gives."""
 
     def __init__(self, size: int) -> None:
-        """Begin a file.
-
-        Args:
-            size: size of the file, bytes.
-        """
+        """Begin a file of `size` bytes."""
         self.left = BASE + RATIO * size
         """Bytes that may still come out."""
 

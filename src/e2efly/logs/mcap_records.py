@@ -50,11 +50,7 @@ class McapRecords:
     """The messages of an MCAP file, up to its end or up to where it is damaged."""
 
     def __init__(self, data: bytes | mmap) -> None:
-        """Begin a file.
-
-        Args:
-            data: all bytes of the file.
-        """
+        """Begin a file, given all of its bytes."""
         self.profile: str | None = None
         """The profile in the file's header. None until the header has been read."""
         self.cut_off = ""

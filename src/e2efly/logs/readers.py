@@ -58,11 +58,7 @@ class Format(NamedTuple):
 
 
 def read_flights(path: Path, reading: LogReading | None = None) -> list[Record]:
-    """The flights of a log. A blackbox can contain several.
-
-    Args:
-        path: the file, or the folder of a ROS 2 bag.
-        reading: how it is read.
+    """The flights of a log. A blackbox can contain several. `path` is the file, or the folder of a ROS 2 bag.
 
     Raises:
         ValueError: naming the file, what is wrong with it and what is accepted. No other error comes from the content

@@ -111,16 +111,8 @@ class Streams:
         self.notes: list[str] = []
 
     def put(self, name: str, time: np.ndarray, values: np.ndarray, source: str = "") -> bool:
-        """Keep the samples that are numbers and whose times rise. The first source of a stream is kept.
-
-        Args:
-            name: of the stream.
-            time: (n,) s.
-            values: (n, k).
-            source: where they are from, for the notes.
-
-        Returns:
-            Whether any sample was kept.
+        """Keep the samples that are numbers and whose times rise. The first source of a stream is kept. The times are
+        (n,) s, the values (n, k). `source` is where they are from, for the notes. Returns whether any sample was kept.
         """
         if name in self.found:
             return False

@@ -192,11 +192,8 @@ def read_bag(path: Path, topics: Sequence[str] = ()) -> Record:
     """A ROS bag: the folder of ROS 2, or one file. Types of messages that are read: `TYPES` and `PX4`.
 
     Where several topics give a stream, those near the origin come before those in coordinates of the Earth, and those
-    that give more streams before those that give fewer. The notes say which one was taken.
-
-    Args:
-        path: the folder or the file.
-        topics: names of topics that are taken before all others.
+    that give more streams before those that give fewer. The notes say which one was taken. The `topics` that are named
+    are taken before all others.
 
     Raises:
         ValueError: when it cannot be read, when the package rosbags is missing, when it does not have one of `topics`,

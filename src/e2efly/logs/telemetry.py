@@ -39,11 +39,8 @@ class Telemetry:
     """
 
     def __init__(self, path: str | Path, queue_size: int = QUEUE_SIZE) -> None:
-        """Create the file and start writing.
-
-        Args:
-            path: path of the file. Its folder is created if necessary.
-            queue_size: the largest number of messages that wait. Further messages are dropped and counted.
+        """Create the file and start writing. Its folder is created if necessary. Messages that come while `queue_size`
+        messages wait are dropped and counted.
 
         Raises:
             ValueError: if the file exists already or cannot be created, or if the package `mcap` is missing.

@@ -86,13 +86,8 @@ TIMES = ("timestamp_sample", "timestamp")
 
 
 def put_topic(streams: Streams, topic: str, fields: Mapping[str, np.ndarray], without: Sequence[str] = ()) -> None:
-    """Add the streams that a topic gives.
-
-    Args:
-        streams: where they go.
-        topic: name of the topic in PX4.
-        fields: (n,) numbers by the path of the field, such as `xyz[0]`.
-        without: streams that are not wanted.
+    """Add the streams that a topic gives. `fields` has (n,) numbers by the path of the field, such as `xyz[0]`. Streams
+    of `without` are not wanted.
     """
     wanted = [each for each in TAKEN if each.topic == topic and each.stream not in (*streams.found, *without)]
     times = [np.asarray(fields[name], float) for name in TIMES if name in fields]

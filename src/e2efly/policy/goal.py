@@ -173,11 +173,8 @@ class Goal:
         return f"{100 * mean_error:.1f} cm off"
 
     def failure(self, memory: Any, outcome: Outcome) -> str:
-        """Why a single flight (n = 1) has failed, as text.
-
-        Args:
-            memory: the task's state before the step that failed.
-            outcome: outcome of that step.
+        """Why a single flight (n = 1) has failed, as text. `memory` is the task's state before the step with this
+        outcome.
         """
         del memory
         return f"the task has failed, {float(outcome.error[0]):.2f} m from its goal"

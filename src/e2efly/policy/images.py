@@ -74,11 +74,8 @@ class Image:
         return (-1.0 if self.sees == "normal" else 0.0), 1.0
 
     def check(self, x: np.ndarray, batch: tuple[int, ...]) -> None:
-        """Refuse what the network must not see.
-
-        Args:
-            x: the image, or one for each observation of a batch.
-            batch: the shape before the image's own: (n,) or ().
+        """Refuse what the network must not see: one image, or one for each observation of a batch. `batch` is the shape
+        before the image's own: (n,) or ().
 
         Raises:
             ValueError: naming the image, for a wrong shape or type, or a value out of range.

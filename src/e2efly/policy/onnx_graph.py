@@ -79,13 +79,8 @@ Made = tuple[tuple[Array, ...], int]
 
 
 def check(graph: Message, inputs: Mapping[str, Shape], outputs: Mapping[str, Shape], rate: float) -> None:
-    """Refuse a graph that is not allowed.
-
-    Args:
-        graph: the graph, from `onnx_file.read`.
-        inputs: names of the inputs, and their shapes without the batch axis.
-        outputs: likewise for the outputs.
-        rate: rate at which it is called, Hz.
+    """Refuse a graph that is not allowed. `graph` is from `onnx_file.read`. Inputs and outputs have shapes by name,
+    without the batch axis. `rate` is the rate at which it is called, Hz.
 
     Raises:
         ValueError: naming the node or the constant, and what is accepted.

@@ -25,12 +25,8 @@ SECONDS, MIB = 20, 1024
 
 
 def open_session(content: bytes, inputs: Sequence[np.ndarray], trusted: bool = False) -> ort.InferenceSession:
-    """A session on one thread.
-
-    Args:
-        content: an ONNX file that was written by `onnx_file.write`.
-        inputs: what its inputs are given in the trial, in their order.
-        trusted: whether it may be loaded without a trial.
+    """A session on one thread. `content` was written by `onnx_file.write`. In the trial, it is given these inputs, in
+    their order. One that is `trusted` may be loaded without a trial.
 
     Raises:
         ValueError: if ONNX Runtime refuses it, or it does not run within the limits.

@@ -181,15 +181,9 @@ def check(
     imu: bool = False,
     images: bool = False,
 ) -> tuple[str, ...]:
-    """The reasons why a policy cannot fly here. Empty: it can.
-
-    Args:
-        contract: the contract of the policy.
-        vehicle: the vehicle that flies.
-        shown: the task's own fields of the observation.
-        control_rate: the rate at which the policy will be called, Hz. None: the rate of its training.
-        imu: whether IMU measurements are available.
-        images: whether the images that the contract asks for are available.
+    """The reasons why a policy cannot fly here. Empty: it can. `shown` has the task's own fields of the observation.
+    `control_rate` is the rate at which the policy will be called, Hz. None: the rate of its training. `imu` and
+    `images` tell whether IMU measurements and the images that the contract asks for are available.
     """
     reasons = list(contract.refusals(vehicle, control_rate))
     if contract.action.mode not in MODES:
@@ -228,11 +222,7 @@ def check(
 
 def begin(runtime: Runtime, odometry: Odometry, now: float) -> RuntimeState:
     """Hand over to the policy. The task starts. The policy is shown hover actions as its past actions, as in training.
-
-    Args:
-        runtime: the policy and its course.
-        odometry: the newest motion.
-        now: the time on the monotonic clock, s. The first action is due at once.
+    `now` is the time on the monotonic clock, s. The first action is due at once.
     """
     contract = runtime.policy.contract
     actions = np.tile(np.asarray(contract.hover_action, np.float32), (contract.past_actions, 1))
@@ -307,13 +297,8 @@ def act(
 
 
 def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float) -> RuntimeState:
-    """Let the task judge what the vehicle has done since the last call of the policy.
-
-    Args:
-        runtime: the policy and its course.
-        state: from `begin` or the last `act`.
-        odometry: the newest motion, in the task's world.
-        now: s on the monotonic clock.
+    """Let the task judge what the vehicle has done since the last call of the policy. `state` is from `begin` or the
+    last `act`. The odometry is the newest, in the task's world. `now` is in s on the monotonic clock.
     """
     if state.steps == 0:
         return dataclasses.replace(state, odometry=odometry)
@@ -333,14 +318,8 @@ def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float
 def observe(
     runtime: Runtime, shown: np.ndarray, past_actions: np.ndarray, odometry: Odometry, imu: Imu | None = None
 ) -> np.ndarray:
-    """The observation, float32 (o,), as the training environment makes it.
-
-    Args:
-        runtime: the policy and its course.
-        shown: (k,) the task's own fields, in their order.
-        past_actions: (a, 4) newest first.
-        odometry: the motion, in the task's world.
-        imu: the measurement, for a policy that sees an IMU.
+    """The observation, float32 (o,), as the training environment makes it. `shown` has the task's own fields, (k,), in
+    their order, and `past_actions` is (a, 4), newest first. The odometry is in the task's world.
 
     Raises:
         ValueError: when the policy sees an IMU and there is none.
@@ -361,13 +340,8 @@ def observe(
 
 
 def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeState | None = None) -> tuple[str, ...]:
-    """The reasons why the policy should not fly from this state of the vehicle. Empty: it may.
-
-    Args:
-        runtime: the policy, its goal and its envelope.
-        odometry: the newest motion.
-        now: s on the monotonic clock.
-        state: the state of a flight that has begun. None: as if the policy took over now.
+    """The reasons why the policy should not fly from this state of the vehicle. Empty: it may. `now` is in s on the
+    monotonic clock. `state` is that of a flight that has begun. None: as if the policy took over now.
     """
     envelope, course = runtime.envelope, runtime.course
     local = odometry.seen_from(course.origin)

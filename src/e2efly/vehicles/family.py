@@ -169,10 +169,8 @@ class Family:
         return [_loaded(self.draw(u), f"{self.name}_{i}") for i, u in enumerate(drawn)]
 
     def draw(self, u: Any) -> Vehicle:
-        """The vehicle that belongs to given uniform numbers.
-
-        Args:
-            u: (*n, `DRAWN`) uniform in [0, 1), from NumPy or JAX.
+        """The vehicle that belongs to given uniform numbers. The numbers are (*n, `DRAWN`), uniform in [0, 1), from
+        NumPy or JAX.
 
         Returns:
             The vehicle. Each field has the leading axes *n. Its largest commanded rates are within the ranges. Its

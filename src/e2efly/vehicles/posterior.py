@@ -113,11 +113,8 @@ class Posterior:
         return normal.clip(-WIDEST, WIDEST) @ self.root.T
 
     def values(self, vehicle: Vehicle, deviation: Any) -> dict[str, Any]:
-        """Fields of the vehicles that have these deviations, each (n, ...), without the latency.
-
-        Args:
-            vehicle: the vehicle with deviations of zero.
-            deviation: (n, d), from `deviation`.
+        """Fields of the vehicles that have these deviations, each (n, ...), without the latency. `vehicle` is the
+        vehicle with deviations of zero. `deviation` is (n, d), from `deviation`.
         """
         drawn: dict[str, list[Any]] = {}
         for i, entry in enumerate(self.entries):

@@ -119,11 +119,8 @@ class Vehicle:
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def under(self, other: "Vehicle", *names: str) -> "Vehicle":
-        """This body with the flight controller of another vehicle.
-
-        Args:
-            other: the vehicle whose values are used.
-            names: the fields to take. If none are named: all of `CONTROLLED`.
+        """This body with the flight controller of another vehicle. If no `names` of fields are given, all of
+        `CONTROLLED` are taken.
         """
         return dataclasses.replace(self, **{name: getattr(other, name) for name in names or CONTROLLED})
 

@@ -32,13 +32,8 @@ def battery_share(vehicle: Vehicle) -> float:
 
 
 def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: str) -> None:
-    """Check the optional terms of the physics that a vehicle has.
-
-    Args:
-        vehicle: the vehicle as read.
-        allocation: matrix from rotor thrusts to collective thrust and torques, (4, 4).
-        weight: weight of the vehicle, N.
-        where: name of the vehicle's file, for the error text.
+    """Check the optional terms of the physics that a vehicle has. The allocation is the matrix from rotor thrusts to
+    collective thrust and torques, (4, 4), and the weight in N. `where` names the vehicle's file in the error text.
 
     Raises:
         ValueError: naming the entry, its value and what is accepted.

@@ -19,12 +19,11 @@ MESSAGES: dict[int, Any] = {
     for kind in (
         messages.ApiVersion, messages.FcVariant, messages.FcVersion, messages.BuildInfo, messages.Name,
         messages.StatusEx, messages.RawImu, messages.Motor, messages.MotorTelemetry, messages.Rc,
-        messages.AttitudeReply, messages.Analog, messages.BatteryState, messages.Debug, mode_slots.ModeRanges,
+        messages.AttitudeReply, messages.BatteryState, mode_slots.ModeRanges,
         mode_slots.ModeLogic, settings_messages.FeatureConfig, settings_messages.BoardAlignment,
         settings_messages.MixerConfig, settings_messages.RxConfig, settings_messages.RxMap,
         settings_messages.FailsafeConfig, settings_messages.RxFailConfig,
-        settings_messages.AdvancedConfig, settings_messages.PidAdvanced, settings_messages.RcTuning, mode_slots.BoxIds,
-        settings_messages.RcDeadband,
+        settings_messages.PidAdvanced, settings_messages.RcTuning, mode_slots.BoxIds, settings_messages.RcDeadband,
         settings_messages.MotorConfig,
     )
 }  # fmt: skip

@@ -52,8 +52,6 @@ class ControllerInfo:
     """Permanent ids of the modes that the controller knows, in the order of the bits of `StatusEx.boxes`."""
     motor: settings_messages.MotorConfig
     """Motor outputs."""
-    advanced: settings_messages.AdvancedConfig
-    """Loop and motor protocol."""
     pid_advanced: settings_messages.PidAdvanced
     """Settings that act between throttle and motors."""
     mixer: settings_messages.MixerConfig
@@ -118,7 +116,6 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         modes=mode_slots.mode_ranges(get(mode_slots.ModeRanges), get(mode_slots.ModeLogic)),
         box_ids=get(mode_slots.BoxIds).ids,
         motor=get(settings_messages.MotorConfig),
-        advanced=get(settings_messages.AdvancedConfig),
         pid_advanced=get(settings_messages.PidAdvanced),
         mixer=get(settings_messages.MixerConfig),
         alignment=get(settings_messages.BoardAlignment),

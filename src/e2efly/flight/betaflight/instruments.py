@@ -98,13 +98,9 @@ class Instruments:
     """Those of the last message."""
 
     def read(self, now: float, info: ControllerInfo, *, land: bool, sends: bool = True) -> Reading:
-        """Evaluate the replies that have come until `now`.
-
-        Args:
-            now: s on the client's clock.
-            info: the settings of the controller, which are needed to decode the active modes.
-            land: the operator asks for a landing, as the pilot does with the mission switch.
-            sends: sticks are sent. While they are not, or have no effect, ANGLE is on, as it should be.
+        """Evaluate the replies that have come until `now`. `now` is in s on the client's clock. The settings of the
+        controller are needed to decode the active modes. `land`: the operator asks for a landing, as the pilot does
+        with the mission switch. While sticks are not sent, or have no effect, ANGLE is on, as it should be.
         """
         fresh = self._fresh()
         if (battery := fresh.get(BatteryState.CODE)) is not None:
@@ -194,13 +190,7 @@ def mission_of(rc: Rc, places: PilotChannels) -> Mission | None:
 
 
 def pilot_of(rc: Rc, places: PilotChannels, mission: Mission) -> Pilot:
-    """What the pilot wants.
-
-    Args:
-        rc: the receiver's channels.
-        places: the channels with the copies of the sticks.
-        mission: what the mission switch asks for.
-    """
+    """What the pilot wants. `places` has the channels with the copies of the sticks."""
 
     def stick(channel: int | None) -> float:
         if channel is None or channel > len(rc.channels):
@@ -230,13 +220,8 @@ class ChannelProbe:
     """When the check began, s."""
 
     def look(self, now: float, reading: Reading, sticks: Sticks, *, grounded: bool) -> tuple[str, ...]:
-        """What is wrong with the channels, in words.
-
-        Args:
-            now: s.
-            reading: the reading of this control step.
-            sticks: the sticks with which the channels are sent.
-            grounded: no flight has begun. When the override is switched off in this state, the check starts again.
+        """What is wrong with the channels, in words. `now` is in s. While `grounded`, no flight has begun. When the
+        override is switched off in this state, the check starts again.
         """
         if self.seen or not reading.override:
             self.seen = self.seen and (reading.override or not grounded)

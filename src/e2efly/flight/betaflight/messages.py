@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.betaflight.codec import MspFrame
-from e2efly.flight.betaflight.msp_names import BATTERY_STATES, SENSORS, arming_disabled, bits, named
+from e2efly.flight.betaflight.msp_names import arming_disabled
 
-SET_RAW_RC, EEPROM_WRITE, REBOOT = 200, 250, 68
+SET_RAW_RC = 200
 """Codes of the messages that tell the controller to do something."""
 CHANNEL_RANGE = (886, 2114)
 """The range of the channels that are sent, µs. It is inside the default range of valid pulses, 885 to 2115."""
@@ -125,31 +125,24 @@ class StatusEx:
     CODE: ClassVar[int] = 150
     cycle_time: float
     """Period of the PID loop, s."""
-    sensors: frozenset[str]
-    """Sensors that it has."""
     boxes: int
     """Bit i: the i-th mode of `BoxIds` is active."""
     cpu_load: float
     """Load of the processor, 0 to 1."""
-    pid_profile: int
-    """Index of the active PID profile, from 0."""
     rate_profile: int
     """Index of the active rate profile, from 0."""
     arming_disabled: tuple[str, ...]
     """Why it cannot be armed, the most serious reason first. Empty: it can."""
-    reboot_required: bool
-    """Some settings take effect only after a reboot."""
 
     @staticmethod
     def parse(payload: bytes) -> "StatusEx":
         """Read a reply."""
-        cycle, _, sensors, low, pid, load, _, rate, extra = unpack("STATUS_EX", "HHHIBHBBB", payload)
+        cycle, _, _, low, _, load, _, rate, extra = unpack("STATUS_EX", "HHHIBHBBB", payload)
         extra &= 15
         layout = f"HHHIBHBBB{extra}sBIB"
-        *_, high, count, flags, state = unpack("STATUS_EX", layout, payload)
+        *_, high, count, flags, _ = unpack("STATUS_EX", layout, payload)
         boxes = low | int.from_bytes(high, "little") << 32
-        disabled = arming_disabled(flags, count)
-        return StatusEx(cycle * 1e-6, bits(sensors, SENSORS), boxes, load / 100, pid, rate, disabled, bool(state & 1))
+        return StatusEx(cycle * 1e-6, boxes, load / 100, rate, arming_disabled(flags, count))
 
     def active(self, ids: Sequence[int]) -> frozenset[int]:
         """Permanent ids of the active modes, given those of `BoxIds`."""
@@ -234,72 +227,29 @@ class AttitudeReply(Attitude):
 
 
 @dataclass(frozen=True)
-class Analog:
-    """Battery and receiver."""
-
-    CODE: ClassVar[int] = 110
-    voltage: float
-    """V."""
-    current: float
-    """A."""
-    drawn_mah: float
-    """Charge drawn, mA*h."""
-    rssi: float
-    """Strength of the receiver's signal, 0 to 1."""
-
-    @staticmethod
-    def parse(payload: bytes) -> "Analog":
-        """Read a reply."""
-        _, drawn, rssi, current, voltage = unpack("ANALOG", "BHHhH", payload)
-        return Analog(voltage / 100, current / 100, drawn, rssi / 1023)
-
-
-@dataclass(frozen=True)
 class BatteryState:
     """Battery."""
 
     CODE: ClassVar[int] = 130
     cells: int
     """Number of cells. 0: no battery found."""
-    capacity_mah: float
-    """The capacity in the settings, mA*h. 0: not set."""
-    drawn_mah: float
-    """Charge drawn, mA*h."""
     current: float
     """A."""
     voltage: float
     """V."""
-    state: str
-    """One of `BATTERY_STATES`."""
 
     @staticmethod
     def parse(payload: bytes) -> "BatteryState":
         """Read a reply."""
-        cells, capacity, _, drawn, current, state, voltage = unpack("BATTERY_STATE", "BHBHhBH", payload)
-        return BatteryState(cells, capacity, drawn, current / 100, voltage / 100, named(state, BATTERY_STATES))
-
-
-@dataclass(frozen=True)
-class Debug:
-    """What the controller's `debug_mode` shows."""
-
-    CODE: ClassVar[int] = 254
-    values: tuple[int, ...]
-    """Their meaning depends on the mode."""
-
-    @staticmethod
-    def parse(payload: bytes) -> "Debug":
-        """Read a reply."""
-        return Debug(unpack("DEBUG", "4h", payload))
+        cells, *_, current, _, voltage = unpack("BATTERY_STATE", "BHBHhBH", payload)
+        return BatteryState(cells, current / 100, voltage / 100)
 
 
 def set_raw_rc(channels: Sequence[int]) -> MspFrame:
     """The frame that sends the receiver's channels to the controller.
 
-    The controller sets channels that are left out to 0, which is not a valid pulse.
-
-    Args:
-        channels: µs, in the receiver's order, which `RxMap` maps. At least 4, at most `MAX_CHANNELS`.
+    Channels are in µs, in the receiver's order, which `RxMap` maps: at least 4, at most `MAX_CHANNELS`. The controller
+    sets channels that are left out to 0, which is not a valid pulse.
 
     Raises:
         ValueError: a channel, or the number of channels, is not valid. The message names it and what is accepted.

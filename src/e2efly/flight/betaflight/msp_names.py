@@ -27,15 +27,6 @@ ARMING_DISABLED = (
 )  # fmt: skip
 """Reasons against arming by bit, as the controller's `status` prints them. The last bit is always ARM_SWITCH. Its
 number is 25 up to MSP 1.46, 28 in 1.47 and 29 since 1.48."""
-SENSORS = ("ACC", "BARO", "MAG", "GPS", "RANGEFINDER", "GYRO", "OPTICALFLOW")
-"""Sensors by bit."""
-MOTOR_PROTOCOLS = (
-    "PWM", "ONESHOT125", "ONESHOT42", "MULTISHOT", "BRUSHED", "DSHOT150", "DSHOT300", "DSHOT600", "PROSHOT1000",
-    "DISABLED", "DRONECAN",
-)  # fmt: skip
-"""Motor protocols by number."""
-BATTERY_STATES = ("OK", "WARNING", "CRITICAL", "NOT PRESENT", "INIT")
-"""Battery states by number."""
 FAILSAFE_PROCEDURES = ("AUTO-LAND", "DROP", "GPS-RESCUE")
 """What the failsafe does, by number."""
 RXFAIL_MODES = ("AUTO", "HOLD", "SET")

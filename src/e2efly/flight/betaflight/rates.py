@@ -138,12 +138,8 @@ class Curve:
 
 
 def stick_to_rate(profile: RateProfile, axis: int, stick: float) -> float:
-    """The rate that a stick commands, rad/s.
-
-    Args:
-        profile: the rate profile of the controller.
-        axis: 0 roll, 1 pitch, 2 yaw.
-        stick: the deflection after the deadband, -1 to 1.
+    """The rate that a stick commands, rad/s. `axis` is 0 for roll, 1 for pitch, 2 for yaw. `stick` is the deflection
+    after the deadband, -1 to 1.
     """
     curve = profile.curves[axis]
     rate = radians(min(curve.at(min(abs(stick), 1.0))[0], curve.limit))
@@ -153,12 +149,8 @@ def stick_to_rate(profile: RateProfile, axis: int, stick: float) -> float:
 def rate_to_stick(profile: RateProfile, axis: int, rate: float) -> float:
     """The deflection, -1 to 1, that commands a rate: the exact inverse of `stick_to_rate`.
 
-    A rate of `profile.max_rate[axis]` or more gives full deflection.
-
-    Args:
-        profile: the rate profile of the controller.
-        axis: 0 roll, 1 pitch, 2 yaw.
-        rate: rad/s.
+    A rate of `profile.max_rate[axis]` or more gives full deflection. `axis` is 0 for roll, 1 for pitch, 2 for yaw.
+    `rate` is in rad/s.
 
     Raises:
         ValueError: the rate is not finite.

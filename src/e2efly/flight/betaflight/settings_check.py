@@ -39,13 +39,8 @@ NOT_TOLD = "not told by this firmware"
 def examine(
     info: ControllerInfo, vehicle: Vehicle, settings: FlightSettings, contract: Contract | None = None
 ) -> tuple[Row, ...]:
-    """The table of `e2efly fly --check`.
-
-    Args:
-        info: the settings as read from the controller.
-        vehicle: the vehicle, whose largest body rates are needed.
-        settings: the settings of the flight, with the pilot's channels.
-        contract: the contract of the policy. If the policy commands body rates, its largest ones are needed instead.
+    """The table of `e2efly fly --check`. The settings of the flight name the pilot's channels. The largest body rates
+    that are needed are those of the contract, if its policy commands body rates, and otherwise the vehicle's.
     """
     api = ".".join(map(str, info.api))
     known = f"BTFL, {RELEASES[0].name} to {RELEASES[-1].name}"
@@ -92,11 +87,6 @@ def hover_schedule(hover: HoverController) -> dict[int, float]:
 
 def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None:
     """Refuse a hover controller that needs telemetry that the flight controller does not report.
-
-    Args:
-        name: the name of the hover controller.
-        hover: the hover controller.
-        info: the settings of the flight controller.
 
     Raises:
         ValueError: telemetry is missing. The message names it, and what is accepted.

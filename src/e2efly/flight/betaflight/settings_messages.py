@@ -13,7 +13,6 @@ from e2efly.flight.betaflight.msp_names import (
     FAILSAFE_PROCEDURES,
     FAILSAFE_SWITCHES,
     FEATURES,
-    MOTOR_PROTOCOLS,
     RXFAIL_MODES,
     bits,
     named,
@@ -62,14 +61,11 @@ class MixerConfig:
     CODE: ClassVar[int] = 42
     mixer: int
     """`QUADX` for a quadrotor in X."""
-    yaw_motors_reversed: bool
-    """Props rotate outwards instead of inwards."""
 
     @staticmethod
     def parse(payload: bytes) -> "MixerConfig":
         """Read a reply."""
-        mixer, reversed_ = unpack("MIXER_CONFIG", "BB", payload)
-        return MixerConfig(mixer, bool(reversed_))
+        return MixerConfig(unpack("MIXER_CONFIG", "BB", payload)[0])
 
 
 @dataclass(frozen=True)
@@ -81,23 +77,14 @@ class RxConfig:
     """A stick below this is low, µs."""
     mid: int
     """Centre of the sticks, µs."""
-    max_check: int
-    """A stick above this is high, µs."""
-    pulse_range: tuple[int, int]
-    """`rx_min_usec` and `rx_max_usec`: pulses outside this range are invalid, µs."""
-    airmode_threshold: int
-    """Throttle at which airmode starts to work, µs."""
-    fpv_angle: float
-    """`fpv_mix_degrees`: the angle by which roll and yaw are mixed while FPV ANGLE MIX is on, rad."""
     smoothing: bool
     """RC smoothing is on: a low-pass filter acts on the sticks before they become rates."""
 
     @staticmethod
     def parse(payload: bytes) -> "RxConfig":
         """Read a reply."""
-        _, high, mid, low, _, least, most, _, _, air = unpack("RX_CONFIG", "BHHHBHHBBH", payload)
-        fpv, *_, smoothing = unpack("RX_CONFIG", "22xB8xB", payload)
-        return RxConfig(low, mid, high, (least, most), air, radians(fpv), bool(smoothing))
+        mid, low, smoothing = unpack("RX_CONFIG", "3xHH24xB", payload)
+        return RxConfig(low, mid, bool(smoothing))
 
 
 @dataclass(frozen=True)
@@ -133,8 +120,6 @@ class FailsafeConfig:
     """Throttle channel during the failsafe landing, µs."""
     switch: str
     """What the failsafe switch does: one of `FAILSAFE_SWITCHES`."""
-    low_throttle_delay: float
-    """If the throttle was low for this time before, the controller disarms instead, s."""
     procedure: str
     """What stage 2 does: one of `FAILSAFE_PROCEDURES`."""
 
@@ -142,9 +127,9 @@ class FailsafeConfig:
     def parse(payload: bytes) -> "FailsafeConfig":
         """Read a reply."""
         # the second byte is the duration of the landing, in units of 0.1 s or 1 s, depending on the firmware
-        delay, _, throttle, switch, low, procedure = unpack("FAILSAFE_CONFIG", "BBHBHB", payload)
+        delay, _, throttle, switch, _, procedure = unpack("FAILSAFE_CONFIG", "BBHBHB", payload)
         names = named(switch, FAILSAFE_SWITCHES), named(procedure, FAILSAFE_PROCEDURES)
-        return FailsafeConfig(delay / 10, throttle, names[0], low / 10, names[1])
+        return FailsafeConfig(delay / 10, throttle, *names)
 
 
 @dataclass(frozen=True)
@@ -160,25 +145,6 @@ class RxFailConfig:
         """Read a reply."""
         entries = struct.iter_unpack("<BH", payload[: len(payload) // 3 * 3])
         return RxFailConfig(tuple((named(mode, RXFAIL_MODES), pulse) for mode, pulse in entries))
-
-
-@dataclass(frozen=True)
-class AdvancedConfig:
-    """Loop and motor outputs."""
-
-    CODE: ClassVar[int] = 90
-    pid_denominator: int
-    """Gyro samples per PID loop."""
-    motor_protocol: str
-    """One of `MOTOR_PROTOCOLS`."""
-    motor_idle: float
-    """Output at zero throttle, 0 to 1."""
-
-    @staticmethod
-    def parse(payload: bytes) -> "AdvancedConfig":
-        """Read a reply."""
-        _, denominator, _, protocol, _, idle = unpack("ADVANCED_CONFIG", "BBBBHH", payload)
-        return AdvancedConfig(denominator, named(protocol, MOTOR_PROTOCOLS), idle / 10000)
 
 
 @dataclass(frozen=True)
@@ -250,12 +216,6 @@ class MotorConfig:
     """Motor outputs."""
 
     CODE: ClassVar[int] = 131
-    min_throttle: int | None
-    """Output at zero throttle, µs. None: firmware since MSP 1.47, which has only `AdvancedConfig.motor_idle`."""
-    max_throttle: int
-    """Output at full throttle, µs."""
-    min_command: int
-    """Output of a stopped motor, µs."""
     count: int
     """Number of motors."""
     tells_speed: bool = False
@@ -264,6 +224,6 @@ class MotorConfig:
     @staticmethod
     def parse(payload: bytes) -> "MotorConfig":
         """Read a reply."""
-        least, most, stopped, count = unpack("MOTOR_CONFIG", "HHHB", payload)
+        (count,) = unpack("MOTOR_CONFIG", "6xB", payload)
         _, dshot, sensor = (*payload[7:10], 0, 0, 0)[:3]  # number of poles, and two flags since MSP 1.42
-        return MotorConfig(least or None, most, stopped, count, bool(dshot or sensor))
+        return MotorConfig(count, bool(dshot or sensor))

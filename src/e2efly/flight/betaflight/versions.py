@@ -18,9 +18,9 @@ files:
 The first bytes of each message in `messages` and `settings`, as far as they are read here, are the same in all
 versions. Later versions append to STATUS_EX (1.46, 1.47, 1.48), BUILD_INFO (1.46), RX_CONFIG (1.45, 1.47), RC_TUNING
 (1.47: the hover throttle) and FC_VERSION (1.47: the version as text). Since 1.47, MOTOR_CONFIG has no `min_throttle`.
-ANALOG, BATTERY_STATE, ADVANCED_CONFIG, PID_ADVANCED, MODE_RANGES, MODE_RANGES_EXTRA, BOXIDS, FAILSAFE_CONFIG, RXFAIL_CONFIG,
+BATTERY_STATE, PID_ADVANCED, MODE_RANGES, MODE_RANGES_EXTRA, BOXIDS, FAILSAFE_CONFIG, RXFAIL_CONFIG,
 MOTOR_TELEMETRY (RPM and ESC) and SET_RAW_RC keep their layouts, and MSP OVERRIDE its permanent id, 50. New modes,
-features, motor protocols and reasons against arming get new numbers, all in `names`.
+features and reasons against arming get new numbers, all in `names`.
 """  # noqa: E501
 
 from dataclasses import dataclass
@@ -106,12 +106,8 @@ def version_text(version: tuple[int, int, int]) -> str:
 
 
 def release_of(api: tuple[int, int], version: tuple[int, int, int], text: str = "") -> Release:
-    """The release that a controller reports.
-
-    Args:
-        api: its MSP version.
-        version: its FC_VERSION.
-        text: the version as the firmware writes it. Empty: the firmware does not write it.
+    """The release that a controller reports. `api` is its MSP version, and `version` its FC_VERSION. `text` is the
+    version as the firmware writes it. Empty: the firmware does not write it.
 
     Raises:
         ValueError: the release is not known. The message names it, the known releases, and what to do.

@@ -112,12 +112,8 @@ class DescentPlan:
 
 
 def descent(plan: DescentPlan, elapsed: float, attitude: Attitude | None) -> list[int]:
-    """The channels of a take-over without an accelerometer, us.
-
-    Args:
-        plan: the last plan of the bridge.
-        elapsed: time since the take-over, s.
-        attitude: the newest attitude of the controller. None: unknown; the body rates are zero.
+    """The channels of a take-over without an accelerometer, us. `elapsed` is the time since the take-over, s. If the
+    controller's attitude is unknown, the body rates are zero.
     """
     times = [at for at, _ in plan.throttle]
     return _channels(plan, plan.throttle[max(bisect_right(times, elapsed) - 1, 0)][1], attitude)
@@ -146,11 +142,8 @@ class WatchedLink:
     """
 
     def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
-        """Start the process.
-
-        Args:
-            target: the text of the link, as for `open_link`.
-            timeout: silence of the bridge in flight after which the process takes over, s.
+        """Start the process. `target` is the text of the link, as for `open_link`. `timeout` is the silence of the
+        bridge in flight after which the process takes over, s.
         """
         open_link(target)  # raises here for a bad target; nothing is opened before the first poll
         self.connections, self.reason = 0, "not polled yet"
@@ -308,13 +301,9 @@ def land(link: Link, plan: DescentPlan, held: bytes = b"", age: float = 0.0) -> 
     The closed throttle must be sent all the time. Some controllers return the control to the receiver when they hear no
     override any more, and the throttle stick, which rests in its middle, would then control the motors.
 
-    While the link is gone, the controller holds what it got last, and the descent does not go on.
-
-    Args:
-        link: the link to the controller.
-        plan: the last plan of the bridge.
-        held: the last stick frame of the bridge, which the controller has held since.
-        age: how old the plan is, s.
+    While the link is gone, the controller holds what it got last, and the descent does not go on. `plan` is the last
+    plan of the bridge, and `age` how old it is, s. `held` is the last stick frame of the bridge, which the controller
+    has held since.
     """
     decoder, attitude, levelled, disarmed, rounds = Decoder(), None, time.monotonic(), 0, 0
     sense, down = plan.sense, plan.throttle[-1][0]

@@ -62,12 +62,8 @@ class Command:
 
 
 def parse_command(message: bytes, received: float, sender: str = "") -> Command:
-    """Read one message.
-
-    Args:
-        message: a JSON object in UTF-8; see `docs/commands.md`.
-        received: time of arrival, s on the local monotonic clock.
-        sender: address of the sender.
+    """Read one message. It is a JSON object in UTF-8; see `docs/commands.md`. `received` is the time of its arrival, s
+    on the local monotonic clock, and `sender` the address of the sender.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.
@@ -113,12 +109,8 @@ class Limits:
 
 
 def within(limits: Limits, command: Command, odometry: Odometry | None) -> Command:
-    """The command, with its numbers clipped to the vehicle's limits like those of a policy.
-
-    Args:
-        limits: the limits of the flight.
-        command: the command as it arrived.
-        odometry: the motion of the vehicle. None: not known, and distances are not checked.
+    """The command, with its numbers clipped to the vehicle's limits like those of a policy. If the motion of the
+    vehicle is not known (None), distances are not checked.
 
     Raises:
         ValueError: for a number far beyond the limits, or a position outside the fence or far from the vehicle. It

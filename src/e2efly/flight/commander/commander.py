@@ -185,13 +185,8 @@ def heading(command: Command, before: Heading, odometry: Odometry, now: float) -
 
 
 def numbers(vehicle: Vehicle, command: Command, odometry: Odometry, yaw: float) -> tuple[float, ...]:
-    """The four numbers of the command's mode in `COMMAND_MODES`.
-
-    Args:
-        vehicle: the vehicle with the gains of the flight. Its position gain holds an altitude.
-        command: a command within the limits.
-        odometry: the present motion.
-        yaw: the yaw to hold, rad.
+    """The four numbers of the command's mode in `COMMAND_MODES`. `vehicle` has the gains of the flight. Its position
+    gain holds an altitude. `yaw` is the yaw to hold, rad.
     """
     x, y, z = command.main.tolist()
     if command.thrust is not None:

@@ -5,12 +5,10 @@ from typing import Any
 from e2efly.config.registry import check_methods, load, referenced
 from e2efly.flight.commander.command import WHAT, parse_command
 from e2efly.flight.commander.commander import CommandSource
-from e2efly.flight.pose.registry import MalformedError
+from e2efly.flight.pose.registry import METHODS, MalformedError
 from e2efly.flight.pose.sources.ros import open_ros
 from e2efly.flight.pose.sources.udp import UdpSource, address_of
 
-METHODS = ("refused", "problem", "read", "close", "describe")
-"""What a command source must have."""
 FORMS = (
     "udp:PORT; udp:HOST:PORT, with HOST an address of this machine; ros1:/topic; ros2:/topic; or "
     "path/to/file.py:Name[:...]"
@@ -19,10 +17,7 @@ FORMS = (
 
 
 def open_commands(text: str) -> CommandSource:
-    """Open a source of commands.
-
-    Args:
-        text: a text as `FORMS` says. Without a HOST, it listens at 127.0.0.1.
+    """Open a source of commands, given as `FORMS` says. Without a HOST, it listens at 127.0.0.1.
 
     Raises:
         ValueError: naming the text and what is accepted. Also for a port that is taken. For a package that is not

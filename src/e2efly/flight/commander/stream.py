@@ -53,18 +53,9 @@ def take(
     *,
     flying: bool = False,
 ) -> CommandStream:
-    """Process one message.
-
-    Args:
-        stream: the stream so far.
-        command: the command as it was read.
-        limits: the limits of the flight.
-        odometry: the motion of the vehicle. None: not known.
-        now: s on the local monotonic clock.
-        timeout: the largest age of a command, s.
-        flying: whether the commander flies. A stream that was silent may start again, with another clock or another
-            sender, only while the commander does not fly. Otherwise, stamps that do not advance would be accepted once
-            per time-out.
+    """Process one message. `now` is in s on the local monotonic clock. `timeout` is the largest age of a command, s. A
+    stream that was silent may start again, with another clock or another sender, only while the commander does not fly.
+    Otherwise, stamps that do not advance would be accepted once per time-out.
     """
     silent = stream.age(now) > timeout and not flying
     first = command.sender if silent or stream.command is None else stream.command.sender
@@ -107,12 +98,8 @@ def refuse(stream: CommandStream, problem: str, now: float, count: int = 1) -> C
 
 
 def silence(stream: CommandStream, now: float, timeout: float) -> str | None:
-    """Why there is no command to fly by now. None: there is one.
-
-    Args:
-        stream: the stream so far.
-        now: s.
-        timeout: the largest age of a command, s.
+    """Why there is no command to fly by now. None: there is one. `now` is in s. `timeout` is the largest age of a
+    command, s.
     """
     age = stream.age(now)
     if age <= timeout:

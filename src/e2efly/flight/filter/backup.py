@@ -224,13 +224,7 @@ def _coast(xp: Any, r: Response, m: ForecastMotion) -> tuple[Number, Number]:
 
 def command(xp: Any, b: Backup, m: ForecastMotion, k: Brake) -> ForecastCommand:
     """The command that the manoeuvre sends now: turn by the shortest way, with the part of the thrust that already
-    points in the desired direction.
-
-    Args:
-        xp: the functions to compute with.
-        b: the vehicle's manoeuvre.
-        m: the state when the command acts.
-        k: the manoeuvre from that state.
+    points in the desired direction. `m` is the state when the command acts, and `k` the manoeuvre from that state.
     """
     xx, xy, xz, yx, yy, yz, bx, by, bz = axes(m)
     nx, ny, nz = by * k.tz - bz * k.ty, bz * k.tx - bx * k.tz, bx * k.ty - by * k.tx

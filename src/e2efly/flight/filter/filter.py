@@ -165,14 +165,8 @@ def feel(memory: FilterMemory, rate: tuple[float, float, float], asked: float) -
 
 
 def watch(filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, *, flying: bool) -> FilterMemory:
-    """The memory after the newest odometry, which may be the same as before.
-
-    Args:
-        filter: the filter.
-        memory: the memory so far.
-        odometry: position, velocity (*n, 3), quaternion (*n, 4), body rate (*n, 3).
-        now: s.
-        flying: whether only the air carries the vehicle.
+    """The memory after the newest odometry, which may be the same as before. The odometry has position and velocity
+    (*n, 3), quaternion (*n, 4) and body rate (*n, 3). `now` is in s. While `flying`, only the air carries the vehicle.
     """
     if odometry.time == memory.stamp or not memory.sent:
         return memory
@@ -255,15 +249,9 @@ def _turning(
 def filtered(
     filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: ForecastCommand, *, floor: bool = True
 ) -> Filtered:
-    """The command nearest to the wanted one that keeps all limits.
-
-    Args:
-        filter: the filter.
-        memory: the memory after `watch`.
-        odometry: the newest odometry.
-        now: s.
-        wanted: thrust over mass and body rates, floats or (n,) each, within the vehicle's limits.
-        floor: whether the lowest height of the fence counts.
+    """The command nearest to the wanted one that keeps all limits. `memory` is that after `watch`. `now` is in s.
+    `wanted` has floats or (n,) each, within the vehicle's limits. `floor` tells whether the lowest height of the fence
+    counts.
     """
     xp = _apart(odometry.position)[0]
     b, r, air = filter.backup, filter.backup.response, memory.air

@@ -118,12 +118,7 @@ class Response:
 @lru_cache(maxsize=4096)
 def turning(gain: float, motor_time: float, h: float) -> tuple[float, float, float, float]:
     """The exact step of a rate loop with rotor lag. The matrix maps (rate error, acceleration) to their values after h
-    s.
-
-    Args:
-        gain: gain of the rate loop, 1/s.
-        motor_time: time constant of the rotors, s.
-        h: length of the step, s.
+    s. `gain` is that of the rate loop, 1/s, and `motor_time` the time constant of the rotors, s.
     """
     m = np.array([[0.0, 1.0], [-gain / motor_time, -1.0 / motor_time]]) * (h / 64)
     total, term = np.eye(2), np.eye(2)

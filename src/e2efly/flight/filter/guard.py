@@ -33,20 +33,13 @@ class FilterError(Exception):
 def keep(
     filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
 ) -> tuple[Ctbr, CommandChange | None]:
-    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits.
-
-    Args:
-        filter: the filter for this vehicle and fence.
-        memory: the memory after `watch`.
-        odometry: the newest odometry.
-        now: s.
-        wanted: the command of the policy.
-        floor: whether the lowest height of the fence counts.
+    """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits. `memory`
+    is that after `watch`. `now` is in s. `floor` tells whether the lowest height of the fence counts.
 
     Raises:
         FilterError: if a number is not finite.
     """
-    told = ForecastCommand(*(float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)))
+    told = _told(wanted)
     try:
         found = filtered(filter, memory, odometry, now, told, floor=floor)
     except (ValueError, ArithmeticError) as error:
@@ -59,12 +52,8 @@ def keep(
     return Ctbr(thrust, Vec3(x, y, z)), CommandChange(found.name, found.room, found.share, wanted)
 
 
-def sent(memory: FilterMemory, command: Ctbr | None, now: float) -> FilterMemory:
-    """The memory after a command was sent. None: the throttle was closed."""
-    if command is None:
-        return remember(memory, ForecastCommand(0.0, 0.0, 0.0, 0.0), now)
-    rate = command.rate
-    return remember(memory, ForecastCommand(*(float(n) for n in (command.thrust, rate.x, rate.y, rate.z))), now)
+def _told(command: Ctbr) -> ForecastCommand:
+    return ForecastCommand(*(float(x) for x in (command.thrust, command.rate.x, command.rate.y, command.rate.z)))
 
 
 class Keeper:
@@ -103,4 +92,5 @@ class Keeper:
 
     def sent(self, command: Ctbr | None, now: float) -> None:
         """Remember the command that was sent. None: the throttle was closed."""
-        self.memory = sent(self.memory, command, now)
+        told = ForecastCommand(0.0, 0.0, 0.0, 0.0) if command is None else _told(command)
+        self.memory = remember(self.memory, told, now)

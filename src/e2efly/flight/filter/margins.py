@@ -76,17 +76,8 @@ def rooms(
     at: ForecastMotion | None = None,
 ) -> tuple[Number, ...]:
     """The room that the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid. In m, negative
-    beyond the limit.
-
-    Args:
-        xp: the functions to compute with.
-        b: the vehicle's manoeuvre.
-        limits: the limits to keep.
-        m: the state.
-        air: what the forecast does not explain.
-        solids: the nearby sides, from `near`.
-        floor: whether the lowest height counts.
-        at: the state for which `near` was called.
+    beyond the limit. `solids` are the nearby sides from `near`, which was called for the state `at`. `floor` tells
+    whether the lowest height counts.
     """
     air = against(xp, m, air)
     k = brake(xp, b, m, air, gains=WAY_GAINS)

@@ -28,10 +28,8 @@ RANGE = (0.85, 1.18)
 
 
 def standing_problem(counts: np.ndarray) -> str | None:
-    """Why this cannot be the accelerometer of a vehicle that stands on the ground. None: it can.
-
-    Args:
-        counts: (3,) counts as the controller reports them, body FLU, smoothed.
+    """Why this cannot be the accelerometer of a vehicle that stands on the ground. None: it can. `counts` is (3,), as
+    the controller reports them, body FLU, smoothed.
     """
     size = float(np.linalg.norm(counts))
     shown = [round(float(c)) for c in counts]
@@ -69,14 +67,8 @@ class Scale:
 
 
 def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt: float) -> Scale:
-    """Learn from a measurement in flight.
-
-    Args:
-        before: the scale so far.
-        attitude: the flight controller's attitude.
-        force: (3,) specific force, body FLU, m/s^2, with the scale at rest.
-        climb: vertical velocity of the newest pose, m/s.
-        dt: time since the previous measurement, s.
+    """Learn from a measurement in flight. `force` is (3,) specific force, body FLU, m/s^2, with the scale at rest.
+    `climb` is the vertical velocity of the newest pose, m/s, and `dt` the time since the previous measurement, s.
     """
     up = float(level(attitude, force)[2])
     wait = CALM_S if abs(up * before.value - GRAVITY) > CALM else before.wait - dt

@@ -78,12 +78,8 @@ class DelayWatch:
 
 
 def felt(watch: DelayWatch, time: float, body_rate: tuple[float, float, float]) -> DelayWatch:
-    """The watch after a reading of the gyro.
-
-    Args:
-        watch: the watch so far.
-        time: when the reading was true, s. For a reply, this is the middle between the request and its arrival.
-        body_rate: body FLU, rad/s. A wrong scale or a bias does no harm.
+    """The watch after a reading of the gyro. `time` is when the reading was true, s. For a reply, this is the middle
+    between the request and its arrival. `body_rate` is body FLU, rad/s. A wrong scale or a bias does no harm.
     """
     if watch.rates and time <= watch.rates[-1][0]:
         return watch
@@ -138,11 +134,7 @@ def delay_of(watch: DelayWatch) -> MeasuredDelay | None:
 
 def delay_problem(delay: MeasuredDelay | None, accepted: float) -> str | None:
     """The reason, in words, why nobody should fly with poses that are so late. None: they are not late, or the delay is
-    unknown.
-
-    Args:
-        delay: the measured delay.
-        accepted: the largest accepted delay, s.
+    unknown. `accepted` is the largest accepted delay, s.
     """
     if delay is None or delay.seconds - 2 * delay.deviation <= accepted:
         return None

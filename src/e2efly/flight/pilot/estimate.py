@@ -114,15 +114,8 @@ def see(
     now: float,
     said: str = "",
 ) -> StateEstimate:
-    """The estimate after the poses of a control step.
-
-    Args:
-        before: the estimate so far.
-        samples: the poses that have come, oldest first. May be empty.
-        flight: the state of the flight.
-        attitude: the controller's attitude. None: unknown.
-        now: s.
-        said: the problem that the pose source reports. Empty: none.
+    """The estimate after the poses of a control step. The poses come oldest first; there may be none. `now` is in s.
+    `said` is the problem that the pose source reports. Empty: none.
     """
     after = before
     waited = before.refused and now - before.good_at > RESTART_S
@@ -174,12 +167,8 @@ def _continues(before: StateEstimate, odometry: Odometry, flight: Flight) -> boo
 
 def compare(before: StateEstimate, mode: Mode, *, measure_delay: bool) -> StateEstimate:
     """On the ground: a contradiction that was found while the vehicle was carried stays until it is carried again and
-    agrees.
-
-    Args:
-        before: the estimate so far.
-        mode: the mode of the flight. In the air nothing changes.
-        measure_delay: measure the delay of the poses, which takes a fraction of a millisecond.
+    agrees. In the air nothing changes. With `measure_delay`, the delay of the poses is measured, which takes a fraction
+    of a millisecond.
     """
     if mode not in GROUNDED:
         return before
@@ -194,15 +183,7 @@ def compare(before: StateEstimate, mode: Mode, *, measure_delay: bool) -> StateE
 
 
 def feel(before: StateEstimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> StateEstimate:
-    """The estimate after a reply of the inertial sensors.
-
-    Args:
-        before: the estimate so far.
-        m: the measurement in the reply.
-        turned_at: when its body rate was true, s.
-        mode: the mode of the flight.
-        now: s.
-    """
+    """The estimate after a reply of the inertial sensors. Its body rate was true at `turned_at`, s. `now` is in s."""
     x, y, z = m.gyro.tolist()
     delays = felt(before.delays, turned_at, (x, y, z)) if mode is Mode.INIT else before.delays
     return replace(before, delays=delays, inertial=inertial.measure(before.inertial, m, now))

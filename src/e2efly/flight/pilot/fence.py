@@ -25,15 +25,10 @@ def fence_problem(
     age: float = 0.0,
     force: np.ndarray | None = None,
 ) -> str | None:
-    """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither.
-
-    Args:
-        fence: the fence.
-        odometry: the position and motion of the vehicle.
-        floor: whether the lowest height counts.
-        guard: whether it counts if the vehicle cannot stop inside.
-        age: how old the odometry is, s.
-        force: (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last. None: not known.
+    """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither. `floor` tells whether the
+    lowest height counts, and `guard` whether it counts if the vehicle cannot stop inside. `age` is that of the
+    odometry, s. `force` is (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last. None: not
+    known.
     """
     v = odometry.velocity
     speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)

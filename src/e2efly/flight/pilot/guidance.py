@@ -50,18 +50,9 @@ def hover(
     *,
     silent: bool = False,
 ) -> tuple[Ctbr, Any, float]:
-    """Fly to a target with odometry.
-
-    Args:
-        controller: the hover controller that flies.
-        memory: the memory of the controller, from its `begin` or the last step.
-        flight: the state of the flight. Its mode and its home are used.
-        target: where the vehicle should be.
-        seen: the present motion.
-        under_way: the commands that were sent but do not act yet.
-        trim: the trim so far, m/s^2.
-        dt: time since the last control step, s.
-        silent: the flight controller is not heard, and may not receive what is sent.
+    """Fly to a target with odometry. `memory` is that of the controller, from its `begin` or the last step. The trim is
+    in m/s^2. `dt` is the time since the last control step, s. While `silent`, the flight controller is not heard, and
+    may not receive what is sent.
 
     Returns:
         The command, the new memory of the controller, and the trim, m/s^2.
@@ -87,15 +78,8 @@ def hover(
 def descend(
     flight: Flight, told: Inertial, attitude: Attitude | None, trim: float, now: float, dt: float
 ) -> tuple[Ctbr, float, Inertial]:
-    """Descend without odometry, and feel for the ground; see `touch`.
-
-    Args:
-        flight: the state of the flight.
-        told: the state of the inertial sensors.
-        attitude: the controller's attitude. None: unknown.
-        trim: the trim so far, m/s^2.
-        now: s.
-        dt: time since the last control step, s.
+    """Descend without odometry, and feel for the ground; see `touch`. The controller's attitude may be unknown (None).
+    The trim is in m/s^2. `now` is in s, and so is `dt`, the time since the last control step.
 
     Returns:
         The command; the trim, m/s^2; the state of the inertial sensors, for which a weighing may have begun.

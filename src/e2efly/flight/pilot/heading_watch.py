@@ -73,12 +73,8 @@ class HeadingWatch:
 
 
 def watched(before: HeadingWatch, odometry: Odometry, attitude: Attitude) -> HeadingWatch:
-    """The watch after another odometry, in flight.
-
-    Args:
-        before: the watch so far.
-        odometry: an odometry that passed the checks.
-        attitude: the flight controller's attitude. Only its roll and pitch are used.
+    """The watch after another odometry, in flight. The odometry has passed the checks. Only roll and pitch of the
+    controller's attitude are used.
     """
     velocity = complex(*(float(v) for v in odometry.velocity[:2]))
     roll, pitch = attitude.roll, attitude.pitch

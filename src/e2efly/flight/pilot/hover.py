@@ -18,8 +18,6 @@ LEVEL_RATE = 3.0
 """The largest body rate in a blind descent, rad/s."""
 SINK_SPEED, SINK_ACCELERATION = 0.55, 3.0
 """A blind descent first reaches this speed, m/s, with this acceleration, m/s^2 ..."""
-SINK_TIME = SINK_SPEED / SINK_ACCELERATION
-"""... which takes this time from rest, s ..."""
 SINK_THRUST = 0.95
 """... and then continues with this share of the weight. It must sink, whatever the last error of the throttle map."""
 SINK_FASTER = 0.2
@@ -53,10 +51,7 @@ def flight_gains(vehicle: Vehicle, latency: float) -> Vehicle:
     In the simulator, the attitude loop runs in the flight controller, without delay. Here it is closed over the link. A
     loop with bandwidth k and delay T loses k T of phase. The attitude loop is limited to half a radian of this loss,
     the velocity loop to a third of the attitude loop's bandwidth, and the position loop to 0.4 of the velocity loop's.
-
-    Args:
-        vehicle: the loaded vehicle.
-        latency: the time from the motion to the body-rate setpoint, s.
+    `latency` is the time from the motion to the body-rate setpoint, s.
     """
     slowest = latency + 1 / float(np.min(vehicle.rate_gain[:2]))
     attitude = np.minimum(vehicle.attitude_gain, 0.5 / slowest)
@@ -75,12 +70,9 @@ def controlled(vehicle: Vehicle, mode: str, odometry: Odometry, command: tuple[f
 
 
 def blind(attitude: Attitude | None, elapsed: float, climb: float = 0.0) -> Ctbr:
-    """Level by the controller's own attitude, and sink. Without any attitude, the body rates are zero.
-
-    Args:
-        attitude: the flight controller's attitude.
-        elapsed: time since the descent began, s.
-        climb: vertical speed when it began, m/s. A climb is stopped, and a fall is slowed, first.
+    """Level by the controller's own attitude, and sink. Without any attitude, the body rates are zero. `elapsed` is the
+    time since the descent began, s. `climb` is the vertical speed when it began, m/s. A climb is stopped, and a fall is
+    slowed, first.
     """
     thrust = SINK_THRUST * GRAVITY
     if elapsed < sink_time(climb):

@@ -193,16 +193,9 @@ def measure(before: Inertial, m: Measurement, now: float) -> Inertial:
 def see(
     before: Inertial, odometry: Odometry, now: float, *, moved: bool, trusted: bool, turned: float, latest: float
 ) -> Inertial:
-    """Process an odometry that passed the checks.
-
-    Args:
-        before: the state so far.
-        odometry: the newest odometry.
-        now: s.
-        moved: it is not a repetition of the previous one.
-        trusted: the velocity is propagated from it.
-        turned: error of its heading, rad.
-        latest: the largest accepted delay of poses, s.
+    """Process an odometry that passed the checks. `now` is in s. An odometry that has `moved` is not a repetition of
+    the previous one. The velocity is propagated from one that is `trusted`. `turned` is the error of its heading, rad,
+    and `latest` the largest accepted delay of poses, s.
     """
     watch = motion_watch.see(before.watch, odometry, latest)
     if not (moved and trusted):

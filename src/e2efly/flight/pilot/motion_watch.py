@@ -176,15 +176,9 @@ def feel(
     thrust: tuple[float, float],
     now: float,
 ) -> MotionWatch:
-    """Process a measurement of the inertial sensors.
-
-    Args:
-        before: the watch so far.
-        attitude: the flight controller's attitude. Only its roll and pitch are used.
-        force: (3,) specific force, body FLU, m/s^2.
-        gyro: (3,) body rate, FLU, rad/s.
-        thrust: specific force according to the throttle, and its possible error, m/s^2.
-        now: s.
+    """Process a measurement of the inertial sensors. Only roll and pitch of the controller's attitude are used. `force`
+    is (3,) specific force, body FLU, m/s^2, and `gyro` (3,) body rate, FLU, rad/s. `thrust` is the specific force
+    according to the throttle, and its possible error, m/s^2. `now` is in s.
     """
     up = _up(attitude)
     last = before.felt[-1] if before.felt else None
@@ -207,12 +201,8 @@ def feel(
 
 
 def see(before: MotionWatch, odometry: Odometry, latest: float = math.inf) -> MotionWatch:
-    """Compare the sensors with another odometry that passed the checks.
-
-    Args:
-        before: the watch so far.
-        odometry: the newest odometry.
-        latest: the largest accepted delay of poses, from the motion to their arrival, s.
+    """Compare the sensors with another odometry that passed the checks. `latest` is the largest accepted delay of
+    poses, from the motion to their arrival, s.
     """
     velocity, quaternion = odometry.velocity, odometry.quaternion
     pose = (odometry.time, velocity, quaternion)

@@ -106,11 +106,8 @@ class Reckonings:
         return Reckonings(newest, anchors, grounded)
 
     def alone(self, *, wrong: bool) -> "Reckonings":
-        """Start a flight without poses, from the median of all reckonings.
-
-        Args:
-            wrong: the poses were wrong, perhaps for a while, so only the older half is used, or in a take-off what
-                was propagated from the ground.
+        """Start a flight without poses, from the median of all reckonings. If the poses were `wrong`, perhaps for a
+        while, only the older half is used, or in a take-off what was propagated from the ground.
         """
         if wrong and self.grounded is not None:
             return Reckonings(self.grounded)
@@ -127,13 +124,7 @@ class Reckonings:
 
 
 def seen(odometry: Odometry, now: float, error: float = 0.0) -> Reckoning:
-    """The reckoning that begins with an odometry at `now`, s.
-
-    Args:
-        odometry: the odometry.
-        now: s.
-        error: error of its heading, rad.
-    """
+    """The reckoning that begins with an odometry at `now`, s. `error` is that of its heading, rad."""
     x, y, z = (float(v) for v in odometry.velocity)
     yaw = yaw_of(odometry.quaternion) - error
     c, s = math.cos(yaw), math.sin(yaw)
@@ -186,26 +177,17 @@ def reckon(
 
 
 def trimmed(trim: float, reckoned: Reckoning, ground: float, dt: float) -> float:
-    """The trim that compensates for a wrong throttle map, m/s^2, after another `dt` s.
-
-    Args:
-        trim: the trim so far, m/s^2.
-        reckoned: the velocity now.
-        ground: the height of the ground, world, m.
-        dt: time since the last control step, s.
+    """The trim that compensates for a wrong throttle map, m/s^2, after another `dt` s. `reckoned` is the velocity now,
+    and `ground` the height of the ground, world, m.
     """
     behind = max(-TRIM_ERROR, min(TRIM_ERROR, _climb(reckoned, ground) - reckoned.climb))
     return max(-LARGEST_TRIM, min(LARGEST_TRIM, trim + TRIM_GAIN * behind * dt))
 
 
 def settle(attitude: Attitude | None, reckoned: Reckoning, ground: float, trim: float = 0.0) -> Ctbr:
-    """Stop the horizontal motion, level the vehicle, and sink. Without an attitude, the body rates are zero.
-
-    Args:
-        attitude: the flight controller's attitude. None: unknown.
-        reckoned: the velocity now.
-        ground: the height of the ground, world, m.
-        trim: added to the thrust, m/s^2; see `trimmed`.
+    """Stop the horizontal motion, level the vehicle, and sink. Without an attitude, the body rates are zero. `reckoned`
+    is the velocity now, and `ground` the height of the ground, world, m. `trim` is added to the thrust, m/s^2; see
+    `trimmed`.
     """
     elapsed = reckoned.time - reckoned.since
     wanted = SINK_GAIN * (_climb(reckoned, ground) - reckoned.climb)

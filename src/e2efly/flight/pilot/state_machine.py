@@ -44,14 +44,7 @@ NEAR_GROUND = 0.3
 
 
 def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -> Flight:
-    """The machine's next state.
-
-    Args:
-        settings: what the flight may do.
-        flight: the state before the step.
-        inputs: what is known now.
-        now: s. It never decreases. After a jump, the step counts as `LONGEST_STEP`.
-    """
+    """The machine's next state. `now`, s, never decreases. After a jump, the step counts as `LONGEST_STEP`."""
     passed = now - flight.now if flight.now else 0.0
     dt = min(max(passed, 0.0), LONGEST_STEP)
     jump = passed - dt

@@ -28,12 +28,8 @@ def start_clock(received: float, stamp: float) -> ClockMap:
 
 
 def follow_clock(clock: ClockMap, received: float, stamp: float) -> tuple[ClockMap, float]:
-    """Process one message.
-
-    Args:
-        clock: the map so far.
-        received: time of arrival, s on the local monotonic clock.
-        stamp: time at which the message was true, s on the source's clock. It must be later than the last one.
+    """Process one message. `received` is the time of its arrival, s on the local monotonic clock. `stamp` is the time
+    at which it was true, s on the source's clock. It must be later than the last one.
 
     Returns:
         The map, and the time of the message, s on the local monotonic clock. This time is at most `received`. It is

@@ -22,11 +22,8 @@ keys."""
 
 
 def parse_pose(message: bytes, received: float) -> Sample:
-    """Read one message.
-
-    Args:
-        message: a JSON object in UTF-8; see `docs/pose-sources.md`.
-        received: time of arrival, s on the local monotonic clock.
+    """Read one message. It is a JSON object in UTF-8; see `docs/pose-sources.md`. `received` is the time of its
+    arrival, s on the local monotonic clock.
 
     Raises:
         ValueError: naming the key, the value and what is accepted.
@@ -40,12 +37,8 @@ def parse_pose(message: bytes, received: float) -> Sample:
 
 
 def object_of(what: str, message: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Parse the JSON object in a message.
-
-    Args:
-        what: the name of the message for error messages.
-        message: the message in UTF-8.
-        keys: the known keys.
+    """Parse the JSON object in a message in UTF-8, which may have the known `keys`. `what` is the name of the message
+    for error messages.
 
     Raises:
         ValueError: if it is not such an object. The message names the key if there is one.

@@ -51,12 +51,8 @@ class Pace:
 
 
 def paced(pace: Pace, time: float, received: float) -> Pace:
-    """The pace after one more good pose.
-
-    Args:
-        pace: the pace so far.
-        time: when the pose was true, s on the local monotonic clock.
-        received: when it arrived, s on the same clock.
+    """The pace after one more good pose. `time` is when the pose was true, and `received` when it arrived, s on the
+    local monotonic clock.
     """
     if pace.time is None:  # the first pose starts the observation and does not count for the rate
         return Pace(time, received, present=Half(began=received))
@@ -68,11 +64,8 @@ def paced(pace: Pace, time: float, received: float) -> Pace:
 
 
 def pace_problem(pace: Pace, timeout: float) -> str | None:
-    """The reason, in words, why nobody should take off with this source. None: it delivers often enough.
-
-    Args:
-        pace: the pace of the source. The age of the newest pose at this moment is not included.
-        timeout: `odometry_timeout` of the flight, s.
+    """The reason, in words, why nobody should take off with this source. None: it delivers often enough. The age of the
+    newest pose at this moment is not included. `timeout` is the `odometry_timeout` of the flight, s.
     """
     accepted = SHARE * timeout
     if pace.time is None or pace.oldest <= accepted:

@@ -26,10 +26,8 @@ class PoseSource(Protocol):
         ...
 
     def read(self, now: float) -> list[Sample]:
-        """The samples that arrived since the last call, oldest first.
-
-        Args:
-            now: time on this machine's monotonic clock, s, the clock of `Sample.received`.
+        """The samples that arrived since the last call, oldest first. `now` is on this machine's monotonic clock, s,
+        the clock of `Sample.received`.
         """
         ...
 
@@ -46,12 +44,7 @@ class PlantSource:
     """A plant in the same process, as a pose source."""
 
     def __init__(self, state: Callable[[float], Iterable[Sample]], name: str = "plant") -> None:
-        """Wrap a plant.
-
-        Args:
-            state: takes the local time, s, and returns the samples since its last call, oldest first.
-            name: the name of the source in messages.
-        """
+        """Wrap a plant. `state` takes the local time, s, and returns the samples since its last call, oldest first."""
         self.refused = 0
         self.problem: str | None = None
         self._state, self._name = state, name
@@ -78,11 +71,8 @@ class Inbox(Generic[T]):
     """Messages as they arrived, parsed when they are read. All sources of bytes share this class."""
 
     def __init__(self, parse: Callable[..., T]) -> None:
-        """Start empty.
-
-        Args:
-            parse: takes a message, its time of arrival, s, and the sender, if `put` was given one. Raises ValueError
-                for a malformed message.
+        """Start empty. `parse` takes a message, its time of arrival, s, and the sender, if `put` was given one. It
+        raises ValueError for a malformed message.
         """
         self.refused = 0
         self.problem: str | None = None

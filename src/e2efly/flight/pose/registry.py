@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from e2efly.config.registry import Registry, check_methods
+from e2efly.config.registry import Registry, check_methods, load, load_installed, referenced
 from e2efly.flight.pose.pose_source import PoseSource
 
 METHODS = ("refused", "problem", "read", "close", "describe")
@@ -12,16 +12,17 @@ METHODS = ("refused", "problem", "read", "close", "describe")
 
 
 @dataclass(frozen=True)
-class PoseKind:
-    """A kind of pose source."""
+class SourceKind:
+    """A kind of source, of poses or of images."""
 
-    open: Callable[[str], PoseSource]
-    """Opens a source, given the text after its name. Raises ValueError that says what is accepted."""
+    open: Callable[..., Any]
+    """Opens a source, given the text after its name, and for images the camera of the policy's contract. Raises
+    ValueError that says what is accepted."""
     form: str
     """How the text for the source is written."""
 
 
-SOURCES: Registry[PoseKind] = Registry("pose source", source=lambda kind: kind.open)
+SOURCES: Registry[SourceKind] = Registry("pose source", source=lambda kind: kind.open)
 """The kinds of pose sources."""
 
 F = TypeVar("F", bound=Callable[[str], PoseSource])
@@ -32,19 +33,35 @@ class MalformedError(ValueError):
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens a pose source, given the text after its name.
-
-    Args:
-        name: the name in `e2efly fly --pose NAME:...`.
-        form: how the whole text is written, for people.
+    """Register a function or a class that opens a pose source, given the text after its name. `name` stands in `e2efly
+    fly --pose NAME:...`. `form` is how the whole text is written, for people.
 
     Raises:
         ValueError: if the name is taken.
     """
-    return SOURCES.adding(name, lambda opener: PoseKind(opener, form))
+    return SOURCES.adding(name, lambda opener: SourceKind(opener, form))
 
 
-def opened(kind: PoseKind, text: str, where: str) -> PoseSource:
+def selected(sources: Registry[SourceKind], text: str) -> tuple[SourceKind, str] | None:
+    """The kind of source that a text names, by a registered name, also of an installed package, or by a reference, and
+    the text after that name. None: it names none.
+
+    Raises:
+        ValueError: when the file or the module of a reference cannot be loaded, naming it.
+    """
+    name, _, where = text.partition(":")
+    if name not in sources and name.isidentifier():
+        load_installed()
+    if name in sources:
+        return sources[name], where
+    if (found := referenced(text)) is None:
+        return None
+    own = load(found[0])
+    known = next((kind for kind in sources.values() if kind.open is own), SourceKind(own, f"{found[0]}[:...]"))
+    return known, found[1]
+
+
+def opened(kind: SourceKind, text: str, where: str) -> PoseSource:
     """Open a source of a kind.
 
     Raises:

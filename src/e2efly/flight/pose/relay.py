@@ -22,14 +22,8 @@ class RelaySource(Generic[T]):
         parse: Callable[[bytes, float], Any] = parse_pose,
         what: str = "pose",
     ) -> None:
-        """Start the relay and wait until it is ready.
-
-        Args:
-            name: the name of the source in messages.
-            python: the interpreter that has the package that the relay needs.
-            arguments: arguments of the relay: its kind, and what it needs to know.
-            parse: parses a message. It takes the message and its time of arrival, s.
-            what: the name of its messages in error messages.
+        """Start the relay and wait until it is ready. `arguments` are the relay's kind, and what it needs to know.
+        `parse` takes a message and its time of arrival, s. `what` is the name of the messages in error messages.
 
         Raises:
             ValueError: with what the relay reports about its failure, or because it does not answer in time.

@@ -46,13 +46,8 @@ def start_slope(time: float, value: np.ndarray) -> Slope:
 
 
 def follow_slope(fit: Slope, rate: float, time: float, value: np.ndarray) -> Slope:
-    """Add one sample to the fit.
-
-    Args:
-        fit: the fit of the samples so far.
-        rate: how fast samples are forgotten, 1/s.
-        time: when the value was true, s. It must be later than `fit.last`.
-        value: (n,) the new value, u.
+    """Add one sample to the fit. `rate` is how fast samples are forgotten, 1/s. `value` is the new value, (n,), u. It
+    was true at `time`, s, which must be later than `fit.last`.
     """
     kept = math.exp(-rate * (time - fit.last))
     weight = kept * fit.weight + 1
@@ -80,11 +75,3 @@ def settled(fit: Slope, rate: float) -> bool:
     constant.
     """
     return fit.count >= 3 and fit.last - fit.first >= 2 / rate
-
-
-def noise_gain(rate: float, interval: float) -> float:
-    """Standard deviation of the slope, u/s, for white noise with a standard deviation of 1 u in samples every
-    `interval` s.
-    """
-    b = math.exp(-rate * interval)
-    return math.sqrt(2 * ((1 - b) / (1 + b)) ** 3) / interval

@@ -63,12 +63,8 @@ def age(track: PoseTrack, now: float) -> float:
 
 
 def track(checks: Checks, track: PoseTrack, sample: Sample) -> tuple[PoseTrack, Odometry | None, str | None]:
-    """Check one sample and estimate what it does not contain.
-
-    Args:
-        checks: the conditions that the sample must satisfy.
-        track: what is remembered of the earlier samples.
-        sample: the sample. Samples must come in the order in which they were received.
+    """Check one sample and estimate what it does not contain. Samples must come in the order in which they were
+    received.
 
     Returns:
         The new track; the odometry, or None; the reason why there is none, or None. A reason starts with a key of

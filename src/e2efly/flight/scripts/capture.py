@@ -81,10 +81,8 @@ class Stamps:
         self._believed: bool | None = None
 
     def moment(self, stamp: float) -> float:
-        """When an image that arrives now was exposed, s on the monotonic clock.
-
-        Args:
-            stamp: the stamp on the wall clock, s. 0: there is none.
+        """When an image that arrives now was exposed, s on the monotonic clock. `stamp` is on the wall clock, s. 0:
+        there is none.
         """
         age = time.time() - stamp
         if self._believed is None:

@@ -42,13 +42,8 @@ def find(rs: Any, devices: Any, serial: str) -> Any:
 def follow(output: Any, rs: Any, device: Any, begun: Any) -> None:
     """Publish the images of a device until it is unplugged.
 
-    The frames are read from its sensor and not from a pipeline, so nothing aligns, decimates or fills them.
-
-    Args:
-        output: the output of the capture process.
-        rs: the module pyrealsense2.
-        device: the camera.
-        begun: called when the camera streams. None: nothing is called.
+    The frames are read from its sensor and not from a pipeline, so nothing aligns, decimates or fills them. `rs` is the
+    module pyrealsense2. `begun` is called when the camera streams, unless it is None.
 
     Raises:
         RuntimeError: the camera does not show what the policy sees, or is unplugged.
@@ -135,11 +130,8 @@ class CameraClock:
         self._apart = math.inf
 
     def moment(self, stamp: float, domain: str) -> float:
-        """When a frame that arrives now was exposed, s on the monotonic clock.
-
-        Args:
-            stamp: the timestamp of the frame, ms.
-            domain: the clock of the stamp: the name of a `rs.timestamp_domain`.
+        """When a frame that arrives now was exposed, s on the monotonic clock. `stamp` is in ms, and `domain` its
+        clock: the name of a `rs.timestamp_domain`.
         """
         if domain in GLOBAL_CLOCK:
             return self._stamps.moment(1e-3 * stamp)

@@ -71,11 +71,8 @@ class BrokenImage(Exception):  # noqa: N818  # it does not end the capture: this
 
 
 def field_of_view(info: Any, rectified: bool) -> tuple[float, float]:
-    """Horizontal and vertical field of view of a pinhole camera, rad: 2 atan(size / (2 f)).
-
-    Args:
-        info: sensor_msgs/CameraInfo of ROS 1 or 2.
-        rectified: use its projection matrix P, which is that of rectified images, instead of K.
+    """Horizontal and vertical field of view of a pinhole camera, rad: 2 atan(size / (2 f)). If it is `rectified`, its
+    projection matrix P is used, which is that of rectified images, instead of K.
 
     Raises:
         ValueError: the camera is not calibrated.

@@ -85,12 +85,8 @@ class Clocks:
         return PING.pack(PING_MAGIC, self._number)
 
     def answered(self, number: int, theirs: float, now: float) -> None:
-        """Process an answer. An answer to an unknown ping is ignored.
-
-        Args:
-            number: the number of the ping.
-            theirs: time on the other clock when it answered, s.
-            now: time on the local clock, s.
+        """Process an answer. An answer to an unknown ping is ignored. `theirs` is the time on the other clock when it
+        answered, and `now` the time on the local clock, s.
         """
         sent = self._sent.pop(number, None)
         if sent is not None:

@@ -147,11 +147,8 @@ class Publisher:
         return memory
 
     def put(self, time: float, values: bytes | bytearray | memoryview) -> None:
-        """Publish an image as the newest one.
-
-        Args:
-            time: when it was exposed, s on this machine's monotonic clock (`time.monotonic()`), not when it arrived.
-            values: `Layout.bytes` bytes, little-endian, row by row from the top.
+        """Publish an image as the newest one: `Layout.bytes` bytes, little-endian, row by row from the top. `time` is
+        when it was exposed, s on this machine's monotonic clock (`time.monotonic()`), not when it arrived.
         """
         assert len(values) == self.layout.bytes
         self._count += 1

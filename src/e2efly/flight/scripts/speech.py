@@ -46,11 +46,8 @@ class Speech:
 
 
 def main(kinds: Mapping[str, Callable[..., None]], arguments: Sequence[str]) -> None:
-    """Run one kind until the standard input ends. Never returns.
-
-    Args:
-        kinds: functions by name. Each is called with the speech and the other arguments.
-        arguments: the name of a kind, followed by the arguments of its function.
+    """Run one kind until the standard input ends. Never returns. `kinds` has functions by name. Each is called with the
+    speech and with the arguments that follow the name of its kind.
     """
     speech = Speech()
 

@@ -18,15 +18,8 @@ class Captured:
     """Images of a capture process. Reading them needs no thread, and no camera driver in this process."""
 
     def __init__(self, name: str, image: Image, python: str, kind: str, where: str, fov: str = "") -> None:
-        """Start the process and wait for its first image.
-
-        Args:
-            name: the name of the source in messages.
-            image: the camera of the policy's contract.
-            python: the interpreter that has the camera's package.
-            kind: the kind of the capture process.
-            where: what this kind needs to know, such as a path or a topic.
-            fov: the field of view, as `field_of_view` gives it.
+        """Start the process and wait for its first image. `where` is what this kind needs to know, such as a path or a
+        topic. `fov` is the field of view, as `field_of_view` gives it.
 
         Raises:
             ValueError: with what the process reports about its failure. Also if no image comes in time, or if the
@@ -81,15 +74,8 @@ class Captured:
 
 
 def open_captured(text: str, image: Image, pythons: Sequence[str], advice: str, where: str, fov: str = "") -> Captured:
-    """Start a capture process with the first interpreter that has the required package.
-
-    Args:
-        text: the name of the source: KIND:WHERE.
-        image: the camera of the policy's contract.
-        pythons: interpreters to try.
-        advice: what to do if it does not open.
-        where: what this kind needs to know, such as a path or a topic.
-        fov: the field of view, as `field_of_view` gives it.
+    """Start a capture process with the first interpreter that has the required package. `text` is KIND:WHERE. The other
+    arguments are those of `Captured`.
 
     Raises:
         ValueError: with what each interpreter reports, and the advice.
@@ -100,10 +86,6 @@ def open_captured(text: str, image: Image, pythons: Sequence[str], advice: str, 
 
 def field_of_view(text: str, name: str) -> tuple[str, str]:
     """Split WHERE[?fov=ACROSSxDOWN] into WHERE and the field of view: `ACROSSxDOWN` in rad, `policy`, or empty.
-
-    Args:
-        text: the text after the name of the source.
-        name: the name of the source, for errors.
 
     Raises:
         ValueError: naming the option and what is accepted.

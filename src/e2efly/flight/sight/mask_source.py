@@ -48,11 +48,8 @@ def capture(output: Any, where: str) -> None:
     """Run the process: a kind of `scripts/capture.py`.
 
     A camera that is covered or frozen would give masks that look like masks of a ground without the object. Colours are
-    therefore checked like the colours of a policy. An image that fails the checks gives no mask.
-
-    Args:
-        output: the output of that script.
-        where: JSON with `segmenter`, `uri` and `image`, the camera of the policy's contract.
+    therefore checked like the colours of a policy. An image that fails the checks gives no mask. `where` is JSON with
+    `segmenter`, `uri` and `image`, the camera of the policy's contract.
 
     Raises:
         ValueError: if the segmenter or the source does not open.

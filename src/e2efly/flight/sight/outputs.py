@@ -83,13 +83,8 @@ def _output(text: str, uri: str) -> Output:
 
 
 def give(image: Image, name: str, output: Output, host: str) -> Child:
-    """Start the process that sends an image on from shared memory.
-
-    Args:
-        image: the image of the contract.
-        name: the name of the shared memory that holds it, float32.
-        output: the output. Not for shared memory.
-        host: address on which TCP is served.
+    """Start the process that sends an image on from shared memory. `name` is that of the shared memory that holds it,
+    float32. The output is any but shared memory. TCP is served on `host`.
 
     Raises:
         ValueError: naming the output and why it is not possible: a port in use, no ROS, or no pinhole camera for ROS.

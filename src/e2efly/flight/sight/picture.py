@@ -24,11 +24,7 @@ def colours(image: np.ndarray, camera: Image) -> np.ndarray:
     """An image as red, green and blue, (h, w, 3) uint8.
 
     Depth is bright near and dark far, over the camera's reach, and `HOLE` where it is 0. Normals are mapped from [-1,
-    1] to [0, 1].
-
-    Args:
-        image: an image of the camera that `Image.check` accepts.
-        camera: the camera of the policy's contract.
+    1] to [0, 1]. `Image.check` must accept the image.
     """
     low, high = camera.limits
     share = np.clip((image - low) / (high - low), 0.0, 1.0)
@@ -40,14 +36,8 @@ def colours(image: np.ndarray, camera: Image) -> np.ndarray:
 
 
 def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
-    """A picture with others of the same size to its right, in two rows, after a gap.
-
-    Args:
-        shown: (h, w, 3) uint8.
-        others: (h, w, 3) uint8 each. If empty, the result is the picture alone.
-
-    Returns:
-        (h or 2 h, ..., 3) uint8. The picture is in the upper left.
+    """A picture with others of the same size to its right, in two rows, after a gap. All are (h, w, 3) uint8. The
+    result is (h or 2 h, ..., 3) uint8, with the picture in the upper left. Without others, it is the picture alone.
     """
     if not len(others):
         return shown
@@ -63,11 +53,8 @@ def sheet(shown: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
-    """A picture for the terminal: each character is two pixels, one above the other.
-
-    Args:
-        pixels: (h, w, 3) uint8.
-        columns: its largest width, characters. A wider picture is reduced to every second, third, ... pixel.
+    """A picture for the terminal: each character is two pixels, one above the other. `pixels` is (h, w, 3) uint8. A
+    picture wider than `columns` characters is reduced to every second, third, ... pixel.
     """
     step = -(-pixels.shape[1] // columns)
     small = pixels[::step, ::step].astype(int)
@@ -82,11 +69,8 @@ def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write a picture, enlarged (ISO/IEC 15948: 8 bits, colour type 2, no filter).
-
-    Args:
-        path: path of the file. Its folder is created.
-        pixels: (h, w, 3) uint8.
+    """Write a picture, enlarged (ISO/IEC 15948: 8 bits, colour type 2, no filter). The folder of the file is created.
+    `pixels` is (h, w, 3) uint8.
 
     Raises:
         OSError: if it cannot be written.

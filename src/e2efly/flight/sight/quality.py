@@ -97,15 +97,9 @@ def see(
     ground: float = 0.0,
     trouble: str | None = None,
 ) -> SeenImages:
-    """Process new frames, oldest first.
-
-    Args:
-        seen: what was known before.
-        frames: frames as the source gave them.
-        now: this machine's monotonic clock, s.
-        odometry: the vehicle's motion in the air. It tells where the ground is in an image. None: it is not known.
-        ground: height of the ground, world, m.
-        trouble: the last problem that the source reported.
+    """Process new frames, oldest first. `now` is on this machine's monotonic clock, s. The vehicle's motion in the air
+    tells where the ground is in an image. `ground` is its height, world, m. `trouble` is the last problem that the
+    source reported.
     """
     if trouble != seen.trouble:
         seen = dataclasses.replace(seen, trouble=trouble)

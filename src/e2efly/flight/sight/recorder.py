@@ -18,12 +18,8 @@ class Recorder:
     """A process that records. Messages that it cannot take at once are dropped, so sending never waits."""
 
     def __init__(self, path: Path, images: Sequence[Image], names: Sequence[str]) -> None:
-        """Start the process.
-
-        Args:
-            path: path of a new file, whose name ends in .mcap.
-            images: the images of the contract.
-            names: the name of the shared memory of each image.
+        """Start the process. The file is new, and its name ends in .mcap. `names` are those of the shared memory of
+        each image.
 
         Raises:
             ValueError: naming the file and what is accepted.

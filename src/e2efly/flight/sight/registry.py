@@ -1,10 +1,10 @@
 """The image sources by name. A source registers itself. A user's own source is given as a reference to its file."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
-from e2efly.config.registry import Registry, check_methods
+from e2efly.config.registry import Registry
+from e2efly.flight.pose.registry import SourceKind
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.images import Image
 
@@ -16,41 +16,17 @@ Opener = Callable[[str, Image], ImageSource]
 resamples its images. Raises ValueError that says what is accepted."""
 
 
-@dataclass(frozen=True)
-class ImageKind:
-    """A kind of image source."""
-
-    open: Opener
-    """Opens a source."""
-    form: str
-    """How the text for the source is written."""
-
-
-SOURCES: Registry[ImageKind] = Registry("image source", source=lambda kind: kind.open)
+SOURCES: Registry[SourceKind] = Registry("image source", source=lambda kind: kind.open)
 """The kinds of image sources."""
 
 F = TypeVar("F", bound=Opener)
 
 
 def register(name: str, form: str) -> Callable[[F], F]:
-    """Register a function or a class that opens an image source, given the text after its name and the camera.
-
-    Args:
-        name: the name in `e2efly fly --image IMAGE=NAME:...`.
-        form: how the whole text is written, for people.
+    """Register a function or a class that opens an image source, given the text after its name and the camera. `name`
+    stands in `e2efly fly --image IMAGE=NAME:...`. `form` is how the whole text is written, for people.
 
     Raises:
         ValueError: if the name is taken.
     """
-    return SOURCES.adding(name, lambda opener: ImageKind(opener, form))
-
-
-def opened(kind: ImageKind, where: str, image: Image) -> ImageSource:
-    """Open a source of a kind.
-
-    Raises:
-        ValueError: naming the text and what is accepted, or naming the file of a source that lacks a method.
-    """
-    source = kind.open(where, image)
-    check_methods(source, METHODS)
-    return source
+    return SOURCES.adding(name, lambda opener: SourceKind(opener, form))

@@ -22,10 +22,8 @@ def samples_file(policy: Path) -> Path:
 
 
 def packed(images: Mapping[str, np.ndarray]) -> bytes:
-    """The content of a samples file.
-
-    Args:
-        images: images by the names of the contract, (k, h, w) or (k, h, w, 3). The first `COUNT` of each are kept.
+    """The content of a samples file. The images are (k, h, w) or (k, h, w, 3), by the names of the contract. The first
+    `COUNT` of each are kept.
     """
     content = io.BytesIO()
     kept: Any = {name: np.asarray(seen[:COUNT], np.float16) for name, seen in images.items()}

@@ -80,12 +80,8 @@ class SharedCamera:
     """The bridge's side: an image source."""
 
     def __init__(self, name: str, camera: Image, called: str | None = None) -> None:
-        """Open images that another program publishes.
-
-        Args:
-            name: the name of the images.
-            camera: the camera of the policy's contract, to which the images are cropped and resampled.
-            called: the name of the source for people. If omitted, the name of the images.
+        """Open images that another program publishes. They are cropped and resampled to `camera`. `called` is the name
+        of the source for people. If omitted, it is that of the images.
 
         Raises:
             ValueError: if no program publishes under this name, or if the published images are not what the policy

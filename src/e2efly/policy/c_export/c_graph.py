@@ -20,11 +20,8 @@ class CNetwork:
 
 
 def network(content: bytes, inputs: Mapping[str, Operand]) -> CNetwork:
-    """The program of a policy's graph, for one observation.
-
-    Args:
-        content: what `load_policy` has checked, its `content`.
-        inputs: the location of each input of the graph, by its name.
+    """The program of a policy's graph, for one observation. `content` is that of a policy that `load_policy` has
+    checked. `inputs` has the location of each input of the graph.
 
     Raises:
         ValueError: for an operator that is used in a way that C is not written for, naming it and its node.

@@ -38,13 +38,8 @@ class Sources:
 
 
 def sources(contract: Contract, content: bytes, name: str, precision: Precision) -> Sources:
-    """Header and source of a policy.
-
-    Args:
-        contract: the contract of the policy.
-        content: the content of its policy.onnx.
-        name: name of the files and prefix of the symbols.
-        precision: the precision in which the network computes.
+    """Header and source of a policy. `content` is that of its policy.onnx. `name` is the name of the files and the
+    prefix of the symbols.
 
     Raises:
         ValueError: for a graph that cannot be converted to C, and for names that would be the same in C.

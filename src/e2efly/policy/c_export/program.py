@@ -106,11 +106,8 @@ def layout(program: CProgram, kept: Iterable[int]) -> tuple[list[int], int]:
     """Place the buffers in memory so that buffers that are needed at the same time do not overlap.
 
     A step that can work in place overwrites a buffer of the same size that no later step reads. Every other step uses
-    the first gap that is large enough.
-
-    Args:
-        program: the program, with its steps in order.
-        kept: buffers that are read after the last step.
+    the first gap that is large enough. The steps of the program are in order. The buffers `kept` are read after the
+    last step.
 
     Returns:
         The offset of each buffer, and the count of numbers that all of them need together.

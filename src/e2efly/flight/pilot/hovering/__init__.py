@@ -25,13 +25,9 @@ _SHIPPED = geometric, indi, mpc, pid  # these modules register their controllers
 
 
 def hover_controller(name: str, vehicle: Vehicle, latency: float, hold: float = 0.0) -> HoverController:
-    """Make a hover controller for a vehicle.
-
-    Args:
-        name: a name in `HOVERS`, or the reference `path/to/file.py:Name` or `module:Name` of the user's own controller.
-        vehicle: the loaded vehicle.
-        latency: the time from the vehicle's motion to its rate loop, s.
-        hold: how long a command is held, s, if this comes in addition to the latency.
+    """Make a hover controller for a vehicle. `name` is one of `HOVERS`, or the reference `path/to/file.py:Name` or
+    `module:Name` of the user's own controller. `latency` is the time from the vehicle's motion to its rate loop, s.
+    `hold` is how long a command is held, s, if this comes in addition to the latency.
 
     Raises:
         ValueError: the name is unknown; the message lists all names. Or a package that the controller needs is missing;

@@ -76,13 +76,8 @@ class Geometric:
 
 
 def turning(vehicle: Vehicle, attitude: Quat, force: Vec3, yaw: Array) -> Vec3:
-    """The body rates that turn the thrust along a force, rad/s.
-
-    Args:
-        vehicle: the vehicle with the gains.
-        attitude: body to world.
-        force: the wanted force of the rotors over mass, world, m/s^2.
-        yaw: the wanted yaw, rad.
+    """The body rates that turn the thrust along a force, rad/s. `attitude` is body to world. `force` is the wanted
+    force of the rotors over mass, world, m/s^2. `yaw` is the wanted yaw, rad.
     """
     error = attitude_along(force * (1 / force.norm()), yaw).conjugate().compose(attitude)
     tilt, turn = -2 * vehicle.attitude_gain[..., 0] * error.w, -2 * vehicle.attitude_gain[..., 1] * error.w

@@ -31,12 +31,8 @@ def attainable(vehicle: Vehicle, wanted: Vec3) -> Vec3:
 
 
 def lead(attitude: Quat, force: Vec3, jerk: Vec3) -> Vec3:
-    """The body rates with which the thrust direction follows a jerk, rad/s.
-
-    Args:
-        attitude: body to world.
-        force: the wanted force of the rotors over mass, world, m/s^2.
-        jerk: the rate of change of this force, world, m/s^3.
+    """The body rates with which the thrust direction follows a jerk, rad/s. `attitude` is body to world. `force` is the
+    wanted force of the rotors over mass, world, m/s^2, and `jerk` its rate of change, world, m/s^3.
     """
     scale = 1 / force.norm()
     return attitude.unrotate((force * scale).cross(jerk * scale))
@@ -54,15 +50,8 @@ def grown(before: Vec3, vehicle: Vehicle, error: Vec3, wanted: Vec3, flown: Vec3
     """The integral after another `dt` s, m/s^2.
 
     It does not change along an axis on which the limits cut the wanted acceleration, unless the error leads back
-    (anti-windup).
-
-    Args:
-        before: the integral so far.
-        vehicle: the vehicle with the gains of the flight.
-        error: wanted velocity minus velocity, world, m/s.
-        wanted: the wanted acceleration, world, m/s^2.
-        flown: the part of it that the limits of the vehicle allow, world, m/s^2.
-        dt: time since the last control step, s.
+    (anti-windup). `error` is the wanted velocity minus the velocity, world, m/s. `wanted` is the wanted acceleration,
+    and `flown` the part of it that the limits of the vehicle allow, world, m/s^2.
     """
     gains, xp = Vec3.of(vehicle.velocity_gain), namespace(error.x, error.z)
     level = FASTEST / xp.maximum(xp.sqrt(error.x**2 + error.y**2), FASTEST)

@@ -62,11 +62,8 @@ class Plan:
 
 
 def planned(frequency: float, lag: float) -> Plan:
-    """The program of an axis of a vehicle.
-
-    Args:
-        frequency: the natural frequency of the plan that meets no limit, rad/s.
-        lag: the time constant with which the acceleration follows, s.
+    """The program of an axis of a vehicle. `frequency` is the natural frequency of the plan that meets no limit, rad/s.
+    `lag` is the time constant with which the acceleration follows, s.
     """
     A, B = _model(lag)
     Q = np.diag([frequency**4, (4 * DAMPING**2 - 2) * frequency**2, 0.0])

@@ -25,12 +25,8 @@ class HoverController(Protocol):
 
     @classmethod
     def of(cls, vehicle: Vehicle, latency: float, hold: float = 0.0) -> Self:
-        """Make a controller.
-
-        Args:
-            vehicle: the loaded vehicle.
-            latency: the time from the vehicle's motion to its rate loop, s.
-            hold: how long a command is held, s, if this comes in addition to the latency.
+        """Make a controller. `latency` is the time from the vehicle's motion to its rate loop, s. `hold` is how long a
+        command is held, s, if this comes in addition to the latency.
 
         Raises:
             ValueError: something that the controller needs is missing on this machine. The message names it.

@@ -68,14 +68,8 @@ def residue(latency: float) -> float:
 
 
 def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, latency: float) -> UnderWay:
-    """The commands under way after a command was held for some time.
-
-    Args:
-        before: the commands under way before.
-        command: the command that was sent.
-        seconds: how long it was the newest command, s.
-        vehicle: the vehicle, whose motor lag and rate gains are used.
-        latency: the time from the vehicle's motion to its rate loop, s.
+    """The commands under way after a command was held for some time. The command was the newest for `seconds`, s. The
+    vehicle's motor lag and rate gains are used. `latency` is the time from its motion to its rate loop, s.
     """
     low, high = (4 * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
     given = namespace(command.thrust).clip(command.thrust, low, high)
@@ -93,13 +87,8 @@ def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, late
 
 
 def slipped(before: Vec3, seen: Seen, under_way: UnderWay, dt: float) -> Vec3:
-    """How much faster the body turns than commanded, rad/s. A steady torque on a rate loop has this effect.
-
-    Args:
-        before: the slip so far.
-        seen: the motion.
-        under_way: the commands under way, with the expected body rates.
-        dt: time since the last control step, s.
+    """How much faster the body turns than commanded, rad/s. A steady torque on a rate loop has this effect. `before` is
+    the slip so far. `under_way` has the expected body rates. `dt` is the time since the last control step, s.
     """
     off = seen.body_rate - under_way.rate
     return (before + (off - before) * (1 - math.exp(-dt / SLIP_S))).clip(SLIP)
@@ -116,14 +105,8 @@ def ahead(
     """Predict the motion that the vehicle will have when all commands under way have acted and the next one begins to.
 
     The body rates follow their setpoint with a first-order lag that is given by the rate gains. The rotors follow
-    theirs with the lag of the motors.
-
-    Args:
-        vehicle: the loaded vehicle.
-        seen: the measured motion.
-        under_way: the commands that were sent but do not act yet.
-        pushed: acceleration caused by everything but the rotors and gravity, world, m/s^2.
-        slip: how much faster the body turns than commanded, rad/s.
+    theirs with the lag of the motors. `pushed` is the acceleration caused by everything but the rotors and gravity,
+    world, m/s^2. `slip` is how much faster the body turns than commanded, rad/s.
 
     Returns:
         The predicted motion, and the collective thrust over mass at that time, m/s^2.

@@ -3,34 +3,24 @@
 import importlib
 import pkgutil
 
-from e2efly.config.registry import load, load_installed, referenced
 from e2efly.flight.pose.pose_source import PoseSource
-from e2efly.flight.pose.registry import SOURCES, PoseKind, opened
+from e2efly.flight.pose.registry import SOURCES, opened, selected
 
 for _file in pkgutil.iter_modules(__path__, f"{__name__}."):
     importlib.import_module(_file.name)
 
 
 def open_source(text: str) -> PoseSource:
-    """Open a pose source.
-
-    Args:
-        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
-            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
-            that it is given.
+    """Open a pose source: NAME:... of a registered kind, also of an installed package, written as its form says. Or a
+    reference to a class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and
+    the text that it is given.
 
     Raises:
         ValueError: naming the text and what is accepted. Also for a port that is taken or a host without an address.
             For a package that is not installed or a peer that does not answer, it says what to do.
     """
-    name, _, where = text.partition(":")
-    if name not in SOURCES and name.isidentifier():
-        load_installed()
-    if name in SOURCES:
-        return opened(SOURCES[name], text, where)
-    if found := referenced(text):
-        own = load(found[0])
-        known = next((kind for kind in SOURCES.values() if kind.open is own), PoseKind(own, f"{found[0]}[:...]"))
-        return opened(known, text, found[1])
+    if chosen := selected(SOURCES, text):
+        kind, where = chosen
+        return opened(kind, text, where)
     forms = "; ".join(kind.form for kind in SOURCES.values())
     raise ValueError(f"pose source is {text!r}; accepted: {forms}; or path/to/file.py:Name[:...]")

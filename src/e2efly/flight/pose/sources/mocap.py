@@ -16,10 +16,8 @@ ADVICE = (
 
 @register("mocap", "mocap:TYPE:HOST:RIGID_BODY")
 def open_mocap(where: str) -> RelaySource[Sample]:
-    """Follow one rigid body.
-
-    Args:
-        where: one of `SYSTEMS`, the address of the machine that streams, and the name of the rigid body there.
+    """Follow one rigid body: `where` has one of `SYSTEMS`, the address of the machine that streams, and the body's name
+    there.
 
     Raises:
         ValueError: for an unknown system, a package that is not installed, or a system that does not answer.

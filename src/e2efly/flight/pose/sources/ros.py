@@ -37,13 +37,8 @@ def open_ros(
 
     ROS 1 and ROS 2 have packages with the same names, so one Python environment holds only one of them. The relay
     therefore runs in this interpreter or in the system's, whichever has the requested version, or in the interpreter
-    that `E2EFLY_ROS_PYTHON` names.
-
-    Args:
-        version: 1 or 2.
-        topic: absolute name of the topic: "/odometry".
-        parse: parses a message, which the relay has converted to JSON. It takes the message and its time of arrival, s.
-        what: "pose" or "command".
+    that `E2EFLY_ROS_PYTHON` names. The name of the topic is absolute: "/odometry". `parse` takes a message, which the
+    relay has converted to JSON, and its time of arrival, s. `what` is "pose" or "command".
 
     Raises:
         ValueError: for a topic without an absolute name, a package that is not installed, or a ROS master that does not

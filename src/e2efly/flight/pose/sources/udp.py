@@ -51,14 +51,9 @@ class UdpSource(Generic[T]):
         *,
         tells_sender: bool = False,
     ) -> None:
-        """Bind the socket.
-
-        Args:
-            host: address of this machine. 0.0.0.0 listens to the whole network.
-            port: the port. 0 selects a free one.
-            parse: parses a datagram. It takes the datagram and its time of arrival, s.
-            what: the name of a datagram in messages.
-            tells_sender: whether `parse` is also told the address of the sender.
+        """Bind the socket. 0.0.0.0 listens to the whole network, and port 0 selects a free one. `parse` takes a
+        datagram and its time of arrival, s, and with `tells_sender` the address of the sender. `what` is the name of a
+        datagram in messages.
 
         Raises:
             ValueError: if the socket cannot be bound.

@@ -56,14 +56,9 @@ class AprilTags:
 
 
 def enlarged(square: np.ndarray, factor: float) -> np.ndarray:
-    """A square in perspective, enlarged about its centre in its own plane.
-
-    Args:
-        square: (4, 2) corners in the image, pixels, in order around the square.
-        factor: new width divided by the old width.
-
-    Returns:
-        (4, 2) corners of the larger square. The original square if a corner would lie behind the camera.
+    """A square in perspective, enlarged about its centre in its own plane. Both squares are (4, 2) corners in the
+    image, pixels, in order around the square. `factor` is the new width divided by the old width. If a corner would lie
+    behind the camera, it is the original square.
     """
     if factor == 1.0:
         return square

@@ -68,10 +68,8 @@ class PadNetwork:
         return (larger > 0.5).astype(np.uint8)
 
     def probability(self, colours: np.ndarray) -> np.ndarray:
-        """The probability that a pixel shows the pad, float32, at the network's input size.
-
-        Args:
-            colours: uint8 (h, w, 3), red first.
+        """The probability that a pixel shows the pad, float32, at the network's input size. `colours` is uint8 (h, w,
+        3), red first.
 
         Raises:
             ValueError: if the network's output does not have that size.

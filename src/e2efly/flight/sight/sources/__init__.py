@@ -6,9 +6,10 @@ import importlib
 import pkgutil
 from collections.abc import Sequence
 
-from e2efly.config.registry import load, load_installed, referenced
+from e2efly.config.registry import check_methods
+from e2efly.flight.pose.registry import selected
 from e2efly.flight.sight.image_source import ImageSource
-from e2efly.flight.sight.registry import SOURCES, ImageKind, opened
+from e2efly.flight.sight.registry import METHODS, SOURCES
 from e2efly.policy.contract import Contract
 from e2efly.policy.images import Image
 
@@ -22,11 +23,7 @@ def forms() -> str:
 
 
 def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
-    """The cameras of a policy, in the order of its contract.
-
-    Args:
-        texts: NAME=URI for each of its images.
-        contract: the contract of the policy.
+    """The cameras of a policy, in the order of its contract. `texts` has NAME=URI for each of its images.
 
     Raises:
         ValueError: naming the image or the text and what is accepted.
@@ -69,24 +66,16 @@ def by_image(texts: Sequence[str], contract: Contract) -> dict[str, str]:
 
 
 def open_image(text: str, image: Image) -> ImageSource:
-    """Open an image source.
-
-    Args:
-        text: NAME:... of a registered kind, also of an installed package, written as its form says. Or a reference to a
-            class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and the text
-            that it is given.
-        image: the camera of the policy's contract.
+    """Open an image source: NAME:... of a registered kind, also of an installed package, written as its form says. Or a
+    reference to a class or a function, path/to/file.py:Name or module:Name, optionally followed by another colon and
+    the text that it is given. `image` is the camera of the policy's contract.
 
     Raises:
         ValueError: naming the text and what is accepted, or with what the source reports about its failure.
     """
-    name, _, where = text.partition(":")
-    if name not in SOURCES and name.isidentifier():
-        load_installed()
-    if name in SOURCES:
-        return opened(SOURCES[name], where, image)
-    if found := referenced(text):
-        own = load(found[0])
-        known = next((kind for kind in SOURCES.values() if kind.open is own), ImageKind(own, f"{found[0]}[:...]"))
-        return opened(known, found[1], image)
+    if chosen := selected(SOURCES, text):
+        kind, where = chosen
+        source = kind.open(where, image)
+        check_methods(source, METHODS)
+        return source
     raise ValueError(f"--image {image.name} is {text!r}; accepted: {forms()}")

@@ -12,11 +12,7 @@ ADVICE = "start e2efly hil with --image IMAGE=tcp:PORT and --host there first"
 
 @register("hil", "hil:HOST:PORT")
 def open_hil(text: str, image: Image) -> Captured:
-    """Receive the image stream of a HIL node. Exposure times are given on this computer's clock.
-
-    Args:
-        text: HOST:PORT.
-        image: the camera of the policy's contract.
+    """Receive the image stream of a HIL node at HOST:PORT. Exposure times are given on this computer's clock.
 
     Raises:
         ValueError: for another text, or if no server answers there.

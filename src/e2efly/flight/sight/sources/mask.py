@@ -15,11 +15,8 @@ ADVICE = f"accepted: {FORM}, with the URI of a source of colours"
 
 @register("mask", "mask:SEGMENTER@URI")
 def open_mask(text: str, image: Image) -> Captured:
-    """Open the other source in a process that makes masks of its images.
-
-    Args:
-        text: SEGMENTER@URI, see `e2efly.flight.sight.mask_source.FORM`.
-        image: the camera of the policy's contract. It has to be a mask.
+    """Open the other source in a process that makes masks of its images. `text` is written as
+    `e2efly.flight.sight.mask_source.FORM`. The camera of the policy's contract has to be a mask.
 
     Raises:
         ValueError: for a policy that sees no mask, with what is wrong with the segmenter, or with what the process

@@ -14,10 +14,6 @@ ADVICE = 'install the package pyrealsense2 (pip install "e2efly[realsense]"; Deb
 def open_realsense(text: str, image: Image) -> Captured:
     """Read the camera with this serial number, or the only camera: depth or colours, depending on what the policy sees.
 
-    Args:
-        text: the serial number, or nothing.
-        image: the camera of the policy's contract.
-
     Raises:
         ValueError: for a camera that is not connected or does not give what the policy sees, or for a missing package.
     """

@@ -28,12 +28,8 @@ def open_ros(version: int, where: str, image: Image) -> Captured:
     """Subscribe to a topic of sensor_msgs/Image. The CameraInfo topic beside it gives the field of view.
 
     The capture process runs in this interpreter or in the system's, whichever has the requested ROS version, or in the
-    interpreter that `E2EFLY_ROS_PYTHON` names.
-
-    Args:
-        version: 1 or 2.
-        where: absolute name of the topic, optionally with the field of view: "/camera/image_raw?fov=1.2x0.9".
-        image: the camera of the policy's contract.
+    interpreter that `E2EFLY_ROS_PYTHON` names. The name of the topic is absolute and may come with the field of view:
+    "/camera/image_raw?fov=1.2x0.9".
 
     Raises:
         ValueError: for a topic without an absolute name or of another type, an encoding that does not give what the

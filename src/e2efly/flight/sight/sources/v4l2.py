@@ -12,11 +12,9 @@ ADVICE = 'install the package OpenCV (pip install "e2efly[video]")'
 
 @register("v4l2", "v4l2:/dev/videoN?fov=ACROSSxDOWN")
 def open_v4l2(text: str, image: Image) -> Captured:
-    """Read a device, or a file at its own frame rate. The end of a file is treated like an unplugged camera.
-
-    Args:
-        text: the path, and the field of view in rad, because no device reports it: `/dev/video0?fov=1.2x0.9`.
-        image: the camera of the policy's contract. It has to see colours.
+    """Read a device, or a file at its own frame rate. The end of a file is treated like an unplugged camera. The path
+    comes with the field of view in rad, because no device reports it: `/dev/video0?fov=1.2x0.9`. The camera of the
+    policy's contract has to see colours.
 
     Raises:
         ValueError: for a policy that sees something else, a missing field of view, or a device that does not open.
