@@ -89,9 +89,7 @@ class TorchEnv:
     def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
         """Simulate one control step, with a new start where an episode ended.
 
-        Args:
-            state: returned by `reset` or by the last step.
-            action: (n, 4), in [-1, 1]. Values outside are clipped.
+        The state comes from `reset` or the last step. Actions, (n, 4), are clipped to [-1, 1].
 
         Raises:
             ValueError: for actions of another shape or type.

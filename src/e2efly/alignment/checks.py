@@ -47,10 +47,6 @@ _GRID = 0.005
 def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
     """The flights, reduced to the parts that can be used. Their notes say what was cut.
 
-    Args:
-        records: the records as read.
-        vehicle: the vehicle, for the geometry of its rotors.
-
     Raises:
         ValueError: naming the file, what is wrong with it, and what is accepted.
     """

@@ -48,12 +48,9 @@ class Stretches:
 
 
 def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float) -> Stretches:
-    """Sections of a flight.
+    """Sections of a flight with commands and body rates, of a length in s.
 
-    Args:
-        record: the flight, with commands and body rates.
-        begin: (n,) start times, s of the record's clock, increasing.
-        length: length of each section, s.
+    `begin` are (n,) increasing start times, s of the record's clock.
     """
     begin, past, m = np.asarray(begin, float), past_steps(), round(length / STEP)
     around = begin[:, None] + STEP * np.arange(-past, m + 1)

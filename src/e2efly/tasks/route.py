@@ -69,14 +69,11 @@ class Route:
     def drawn(cls, course: Course, file: Path) -> "Route":
         """The options that give a course which a training environment has drawn.
 
-        Args:
-            course: the course as drawn.
-            file: path of a .toml file that is written if the options need a file: a track.
+        If the options need a file, a track, it is written to the path of a .toml file.
 
         Raises:
             OSError: when the file cannot be written.
         """
-        del course, file
         return cls()
 
     def unused(self) -> tuple[str, ...]:
@@ -131,10 +128,7 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
     """The course that a policy was trained to fly, at the place that the options give.
 
-    Args:
-        contract: the policy's contract. Its task determines which options there are.
-        vehicle: the vehicle that flies. Its feet height and its size are used.
-        route: where to fly. If left out: where the training was.
+    Without a route, it is where the training was. The vehicle matters by its feet height and its size.
 
     Raises:
         ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,

@@ -185,11 +185,9 @@ def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], 
 
 
 def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
-    """Settings of whole flights on the rig. The firmware on the rig has no battery.
+    """Settings of whole flights on the rig, at this height above the ground, m. The firmware on the rig has no battery.
 
-    Args:
-        height: height of the hover above the ground, m.
-        reach: radius of the fence about the origin, m.
+    `reach` is the radius of the fence about the origin, m.
     """
     fence = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
     return dataclasses.replace(

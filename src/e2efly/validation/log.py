@@ -40,10 +40,7 @@ def motion_streams(time: np.ndarray, states: Sequence[RigidState], rotor_speed: 
 def record_of(path: Path, flight: Trajectory, mode: str) -> Record:
     """The log of a flight that has kept its samples.
 
-    Args:
-        path: path of the log's file.
-        flight: as `fly` returns it with `sample`.
-        mode: the command mode. For ctbr the log contains the commands, at the times when they were sent.
+    In the command mode ctbr it contains the commands, at the times when they were sent.
     """
     streams = motion_streams(
         np.array([s.time for s in flight.samples]),

@@ -35,14 +35,7 @@ class Outlook:
 
     @staticmethod
     def of(env: Env, memory: Any, eyes: tuple[Eye, ...], seed: int) -> "Outlook":
-        """The world of an episode.
-
-        Args:
-            env: the training's environment.
-            memory: the task's state at its start, leaves (1, ...).
-            eyes: how the cameras are mounted, leaves (1, ...).
-            seed: seed of the noise.
-        """
+        """The world of an episode, from the task's state and the mounted cameras at its start, leaves (1, ...)."""
         shapes = jax.eval_shape(lambda key: env.reset(key, 1)[0], jax.random.key(0))
         blank = dataclasses.replace(shapes, key=None, memory=None, eyes=None)
         zeros = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), blank)

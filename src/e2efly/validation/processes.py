@@ -297,16 +297,9 @@ def bridge(
     *,
     urgent: bool = False,
 ) -> Program:
-    """`e2efly fly` as a process.
+    """`e2efly fly` as a process. Further options come last.
 
-    Args:
-        policy: a policy.onnx, or another text that the command accepts.
-        room: the room in which to fly.
-        log: log of the flight.
-        options: further options of the command. They come last.
-        link: address of the link to the firmware. None: the room's own.
-        pose: source of the poses. None: the room itself.
-        urgent: as for `Program`.
+    Without a link and a pose source, it connects to the room's own link and takes the room's poses.
     """
     command = ["-m", "e2efly", "fly", str(policy), "--link", link or room.link, "--log", str(log)]
     command += ["--pose", pose or f"udp:{room.pose_port}", "--flight.battery-unknown"]

@@ -87,18 +87,10 @@ def rehearse(
     scenery: Scenery | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
 ) -> Rehearsal:
-    """Fly one whole flight.
+    """Fly one whole flight. The vehicle is that of the world and of the bridge.
 
-    Args:
-        firmware: the built firmware.
-        policy: as loaded.
-        vehicle: the vehicle of the world and of the bridge.
-        course: where it flies. If left out: where the training was.
-        seed: seed of the place where the vehicle stands and of the poses' noise.
-        log: keeps the flight's record.
-        folder: folder of the firmware's files. If left out: a temporary one.
-        scenery: the world that a policy sees. None: the policy sees nothing.
-        wrap: a wrapper around each camera, between the camera and the bridge.
+    Without a course, it flies where the training was. `scenery` is the world that a policy sees. `wrap` puts a wrapper
+    between each camera and the bridge.
     """
     course = whole_course(policy, vehicle) if course is None else course
     course = course if scenery is None else scenery.on(course)

@@ -65,12 +65,7 @@ class Scenery:
         return dataclasses.replace(course, goal=self.course.goal, memory=self.course.memory)
 
     def sources(self, state: Callable[[], RigidState], origin: Origin) -> list["SceneCamera"]:
-        """The cameras of this scenery on a vehicle.
-
-        Args:
-            state: the vehicle's true state now, in the room.
-            origin: origin of the task's world in the room.
-        """
+        """The cameras of this scenery on a vehicle whose true state in the room is `state()`."""
         return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
 
     def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
@@ -123,14 +118,7 @@ class SceneCamera:
     """A camera in a rendered world as an image source. It exposes at its rate, and delivers images a latency later."""
 
     def __init__(self, scenery: Scenery, which: int, state: Callable[[], RigidState], origin: Origin) -> None:
-        """Mount the camera.
-
-        Args:
-            scenery: the world that it sees.
-            which: number of the scenery's camera.
-            state: the vehicle's true state now, in the room.
-            origin: origin of the scenery's world in the room.
-        """
+        """Mount one of the scenery's cameras on a vehicle whose true state in the room is `state()`."""
         self.problem: str | None = None
         self._scenery, self._which, self._state, self._origin = scenery, which, state, origin
         self._camera = scenery.cameras[which]

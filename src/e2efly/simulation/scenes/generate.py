@@ -22,12 +22,7 @@ def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, flo
 def forest(key: PRNGKeyArray, n: int, config: ForestConfig, start: Array, goal: Array) -> Solids:
     """Upright trunks, uniformly distributed over a lane that begins at the start and follows x.
 
-    Args:
-        key: key for the worlds.
-        n: number of worlds.
-        config: the forest.
-        start: (n, 3) point that is kept clear, world, m.
-        goal: (n, 3) point that is kept clear, world, m.
+    Start and goal (world, m) are kept clear.
 
     Returns:
         Cylinders. Their mean number follows from `config.density`. A trunk that would stand in a clear place is left

@@ -65,18 +65,15 @@ class GapGoal(Goal):
 
     def goal(self, memory: GapMemory, time: Array) -> Array:
         """The middle of the slit; once it is passed, the point behind it."""
-        del time
         both = self.targets(memory)
         return namespace(both).where(memory.passed[:, None], both[:, 1], both[:, 0])
 
     def target_offsets(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both targets minus position."""
-        del time
         return offsets(self.targets(memory), body)
 
     def flat_axes(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both axes as one vector."""
-        del time
         return self.axes(memory).reshape(body.position.shape[0], 6)
 
     observation = (
@@ -123,7 +120,6 @@ class GapGoal(Goal):
         The slit is passed in a step whose straight line crosses the wall's middle plane forward inside the opening.
         Crossing this plane forward anywhere else fails, also beside the wall.
         """
-        del timed_out
         c, xp = self.config, namespace(after.position)
         a, b = (unrotate(memory.quaternion, body.position - memory.centre) for body in (before, after))
         share = a[:, 0] / xp.where(a[:, 0] == b[:, 0], 1.0, a[:, 0] - b[:, 0])
@@ -149,7 +145,6 @@ class GapGoal(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The time of passing the slit, as text."""
-        del mean_error, final_error
         return f"through after {arrivals[0]:.2f} s, then {speed:.1f} m/s" if arrivals else "not through"
 
     def failure(self, memory: GapMemory, outcome: Outcome) -> str:

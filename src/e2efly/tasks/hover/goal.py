@@ -52,7 +52,6 @@ class HoverGoal(Goal):
 
         Leaving the fence, touching the ground or tumbling fails.
         """
-        del before
         c = self.config
         error = distance(after.position, self.goal(memory, time))
         held = held_longer(memory, error < c.radius, self.control_period)

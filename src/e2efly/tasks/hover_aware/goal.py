@@ -57,7 +57,6 @@ class HoverAwareGoal(Goal):
 
     def goal(self, memory: HoverAwareMemory, time: Array) -> Array:
         """The point to hover at."""
-        del time
         xp = namespace(memory.held)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.held.shape, 3))
 
@@ -109,7 +108,6 @@ class HoverAwareGoal(Goal):
 
         Leaving the fence, or touching the ground or the object, fails.
         """
-        del before
         c, ball = self.config, self.look_at(memory, time)
         error = distance(after.position, self.goal(memory, time))
         pixel = self.pixel(after.position, after.quaternion, ball)

@@ -33,7 +33,6 @@ class Landing(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The place and speed of the touch, as text."""
-        del arrivals, mean_error
         return f"touched {100 * final_error:.1f} cm off at {speed:.2f} m/s"
 
 
@@ -46,7 +45,6 @@ class LandGoal(Landing):
 
     def goal(self, memory: Array, time: Array) -> Array:
         """The position of the centre of mass when the vehicle stands on the pad."""
-        del memory
         zero = 0.0 * time
         return namespace(time).stack([zero, zero, zero + self.shape.feet_height], axis=-1)
 
@@ -76,7 +74,6 @@ class LandGoal(Landing):
 
         The episode ends at the first touch. It is judged at the end of the step.
         """
-        del before, timed_out
         return memory, touchdown(self.config, after, self.goal(memory, time), touches_ground(self.shape, after))
 
 
@@ -117,7 +114,6 @@ class LandRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        del control_period
         start = np.array([1.0, 0.5, 2.0])
         goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)
         return Course(goal, np.zeros((1, 0)), start, lowest=math.inf, origin=pad)

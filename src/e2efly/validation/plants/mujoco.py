@@ -101,13 +101,10 @@ class MujocoPlant(Plant):
     alters = EVERYTHING
 
     def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", largest_step: float = STEP) -> None:
-        """Make the plant, with the vehicle standing on the ground.
+        """Make the plant, with the vehicle standing on the ground and a flight controller that is tuned to it.
 
-        Args:
-            vehicle: as loaded. The flight controller is tuned to it.
-            command_mode: the mode of the commands of `step`: a name of `COMMAND_MODES`. Modes above `ctbr` go through
-                the bridge's own controllers before each step.
-            largest_step: longest step of MuJoCo and the rate loop, s.
+        Command modes above `ctbr` go through the bridge's own controllers before each step. `largest_step` is the
+        longest step of MuJoCo and the rate loop, s.
 
         Raises:
             ValueError: for an unknown command mode, or a step that is not positive.

@@ -34,14 +34,8 @@ def cast(
 ) -> dict[str, Array]:
     """The images of n sensors in the one world, also inside compiled programs. Images have no gradient.
 
-    Args:
-        scene: the world.
-        origin: start of the rays, world, m.
-        matrix: map from the sensor's frame to the world. Its columns may have any length, so that it also sets the
-            field of view.
-        pattern: directions of the rays.
-        channels: names from `CHANNELS`.
-        light: light for rgb. Its squares are not drawn, because the file gives the ground's colour.
+    The arguments are those of `e2efly.simulation.scenes.cast.cast`. The squares of the light are not drawn, because the
+    file gives the ground's colour.
 
     Returns:
         Images (n, h, w): `depth` along the ray's direction, `FAR` without a hit; `label`; `instance`; and (n, h, w, 3):

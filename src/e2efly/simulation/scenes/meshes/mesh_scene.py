@@ -107,7 +107,6 @@ class MeshScene:
 
     def at(self, time: Float[Array, " n"]) -> "MeshScene":
         """The world at any time. Nothing in it moves."""
-        del time
         return self
 
     def beside(self, other: "MeshScene") -> "MeshScene":
