@@ -56,7 +56,6 @@ class Prototype:
     mass_sigma: float
     centre: np.ndarray
     """Centre of mass, relative to the origin of the list, FLU, (3,) m."""
-    centre_sigma: np.ndarray
     inertia: np.ndarray
     """Inertia about the centre of mass, body axes, (3, 3) kg*m^2."""
     inertia_sigma: np.ndarray
@@ -94,14 +93,14 @@ SHAPES: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
 by the mass, m^2. The axis of cylinders and tubes is their own z axis."""
 
 
-def prototype(parts: tuple[Part, ...], seed: int = 0) -> Prototype:
+def prototype(parts: tuple[Part, ...]) -> Prototype:
     """Combine the parts. The standard deviations come from a Monte Carlo simulation over the tolerances, which are
     assumed to be independent.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     one = tuple(x[0] for x in _add(parts, np.zeros, 1))
     drawn = [x.std(0) for x in _add(parts, rng.standard_normal, DRAWS)]
-    return Prototype(float(one[0]), float(drawn[0]), one[1], drawn[1], one[2], drawn[2])
+    return Prototype(float(one[0]), float(drawn[0]), one[1], one[2], drawn[2])
 
 
 def _add(

@@ -22,7 +22,6 @@ from e2efly.vehicles.vehicle import Vehicle
 
 UNDECLARED = "The policy does not say for which courses it was trained."
 ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"
-_ORIGIN = ("origin", "origin_yaw")
 
 
 def place(default: Any) -> Any:

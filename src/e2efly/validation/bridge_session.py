@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,7 +80,6 @@ class Session:
         course: Course | None = None,
         log: Log | None = None,
         link: Link | None = None,
-        wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
         cameras: Sequence[ImageSource] = (),
         commands: CommandSource | None = None,
@@ -193,10 +191,3 @@ def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
     return dataclasses.replace(
         FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True, fence=fence,
     )  # fmt: skip
-
-
-def flight_folder(base: Path, name: str) -> Path:
-    """Make a folder for one firmware."""
-    folder = base / name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder

@@ -153,7 +153,7 @@ class Program:
         self.process.send_signal(by)
         return self._status(seconds)
 
-    def leave(self, seconds: float = 10.0) -> int | None:
+    def leave(self) -> int | None:
         """Close its standard input, which ends the programs of a room.
 
         Returns its exit status, or None as for `end`.
@@ -161,7 +161,7 @@ class Program:
         assert self.process.stdin is not None
         with suppress(OSError):
             self.process.stdin.close()
-        return self._status(seconds)
+        return self._status(10.0)
 
     def _status(self, seconds: float) -> int | None:
         try:

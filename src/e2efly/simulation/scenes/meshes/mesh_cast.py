@@ -62,9 +62,7 @@ def _more(name: str) -> tuple[int, ...]:
 
 def _rays(pattern: Pattern) -> Float[np.ndarray, "3 r"]:
     """Directions of the rays in the order of the image's pixels."""
-    rows, columns, th, tw = pattern.layout
-    cut = pattern.tiles.reshape(rows, columns, 3, th, tw).transpose(2, 0, 3, 1, 4)
-    return np.ascontiguousarray(cut.reshape(3, -1), np.float32)
+    return np.ascontiguousarray(pattern.directions.reshape(-1, 3).T, np.float32)
 
 
 @functools.cache
