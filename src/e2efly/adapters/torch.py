@@ -55,13 +55,7 @@ class TorchEnv:
     """
 
     def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
-        """Create the environments.
-
-        Args:
-            task: the name of a task or a reference to it, with its preset for PPO. Or a configuration, of which only
-                the task, the reward and the environment are used.
-            num_envs: number of vehicles.
-            raw: return observations as measured, not as features (`learn.networks.Features`).
+        """Create the environments. The arguments are those of `e2efly.adapters.gym.QuadrotorVectorEnv`.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.

@@ -113,13 +113,10 @@ class Model:
 
     @staticmethod
     def of(vehicle: Vehicle, driver: str, believed: Vehicle | None = None, only: tuple[str, ...] = ()) -> "Model":
-        """The model of a vehicle.
+        """The model of a vehicle that a stream drives.
 
-        Args:
-            vehicle: what is known of the vehicle that flies.
-            driver: the stream that drives it.
-            believed: the vehicle that its flight controller assumes. If omitted, the same vehicle.
-            only: names of the unknowns to estimate. If omitted, all that the flights can show.
+        `believed` is the vehicle that its flight controller assumes; if omitted, the same vehicle. `only` names the
+        unknowns to estimate; if omitted, they are all that the flights can show.
         """
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))

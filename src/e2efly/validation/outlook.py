@@ -48,13 +48,9 @@ class Outlook:
         return dataclasses.replace(self, world=jax.device_put(world))
 
     def images(self, state: RigidState, time: float, count: int, which: tuple[int, ...]) -> list[np.ndarray]:
-        """The cameras' images without latency.
+        """The cameras' images without latency, from a state in this world at a time of the world, s.
 
-        Args:
-            state: state of the vehicle, in this world.
-            time: time of the world, s.
-            count: number of images so far. Each image has other noise.
-            which: numbers of the cameras.
+        `count` is the number of images so far, because each image has other noise. `which` are numbers of the cameras.
 
         Returns:
             One image for each camera: (h, w), or (h, w, 3) for colours.

@@ -40,11 +40,10 @@ class Sight:
     """Seed of the noise."""
 
     def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "PlantWatch":
-        """The watch for a flight that begins.
+        """The watch for a flight that begins. Without `taken`, all images are rendered.
 
-        Args:
-            taken: for the plant's own cameras: by the camera's number, a function from the time since the start, s, to
-                the newest image. None: all images are rendered.
+        For the plant's own cameras, `taken` has functions by their number, from the time since the start, s, to the
+        newest image.
         """
         return PlantWatch(self, taken or {})
 
@@ -72,9 +71,7 @@ class PlantWatch:
     def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
         """The policy's images in control step `k`: for each camera the newest image, (h, w) or (h, w, 3).
 
-        Args:
-            k: the step. Steps must be requested in order.
-            states: states of the vehicle, one per control step until now. The last one is the present state.
+        Steps must be requested in order. `states` are those of the vehicle until now, one per control step.
         """
         sight = self.sight
         for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):

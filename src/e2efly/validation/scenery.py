@@ -69,13 +69,10 @@ class Scenery:
         return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
 
     def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
-        """A camera's image without latency. It is bit for bit that of `Env.look`.
+        """A camera's image without latency, from a state in this world at a time of the world, s.
 
-        Args:
-            which: number of the camera.
-            state: state of the vehicle, in this world.
-            time: time of the world, s.
-            count: number of images so far. Each image has other noise.
+        It is bit for bit that of `Env.look`. `count` is the number of images so far, because each image has other
+        noise.
         """
         return self.outlook.images(state, time, count, (which,))[0]
 

@@ -78,13 +78,9 @@ class LandGoal(Landing):
 
 
 def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
-    """The verdict on a landing.
+    """The verdict on a landing, by `radius`, `height_error`, `speed` and `tilt` of the options, and their `fence`.
 
-    Args:
-        config: options with `radius`, `height_error`, `speed` and `tilt` at the touch, and the `fence`.
-        body: the vehicles at the end of the step.
-        goal: (n, 3) their position after landing.
-        touched: (n,) whether they touch the pad or the ground.
+    `goal` is the position of the vehicles after landing. `touched` marks those that touch the pad or the ground.
     """
     xp = namespace(body.position)
     offset = body.position - goal
