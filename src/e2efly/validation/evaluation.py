@@ -235,7 +235,6 @@ def _flown_by(found: Candidate, baseline: str) -> Candidate:
 
 
 def _hash(vehicle: str) -> str:
-    """The hash of a vehicle or a family."""
     family = load_family(vehicle)
     return load_vehicle(vehicle).hash if family is None else family.hash
 
@@ -490,7 +489,6 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
 
 
 def _camera(image: Image) -> CameraConfig:
-    """The camera options for an image of a contract."""
     known: dict[str, Any] = {"sees": image.sees, "projection": image.projection}
     known |= {"of": image.of} if image.of != NONE else {}
     known |= {"encoding": image.encoding} if image.encoding != NONE else {}

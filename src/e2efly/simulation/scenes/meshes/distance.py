@@ -209,7 +209,6 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Whether points are inside a solid."""
     with needed("mesh"):
         from e2efly.simulation.scenes.meshes.embree import Embree
 

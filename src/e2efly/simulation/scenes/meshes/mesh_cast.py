@@ -97,7 +97,6 @@ def _seen(
     matrix: np.ndarray,
     *light: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Images of some cameras."""
     if channels == ("depth",):
         return {"depth": engine.depth(origin, matrix, rays)}
     hits = engine.hits(origin, matrix, rays)
