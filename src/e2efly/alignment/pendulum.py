@@ -71,8 +71,7 @@ def _axis(where: str, entry: Any) -> tuple[float, float, tuple[float, float]]:
     if np.any(np.abs(times / period - 1) > 0.1):
         raise ValueError(
             f"{where}: periods is {shown(listed)}: they differ by more than 10 % from their median, "
-            f"{period * count:.3g} s; "
-            "accepted: the same number of periods each time"
+            f"{period * count:.3g} s; accepted: the same number of periods each time"
         )
     inertia = m * GRAVITY * (distance / 2) ** 2 * np.mean(times) ** 2 / (4 * np.pi**2 * length)
     timing = np.std(times, ddof=1) / np.sqrt(len(times)) / period

@@ -98,14 +98,8 @@ def rendered(
 ) -> np.ndarray:
     """A camera's image as the environment renders it, from the pose and the world of a latency ago.
 
-    Args:
-        camera: the camera.
-        eye: how it is mounted on the vehicle: leaves (1, ...).
-        scene: one world.
-        states: states of the vehicle, a period apart, newest first, back to the eye's latency ago.
-        now: time of the newest state, s.
-        period: time between the states, s.
-        key: key of the noise.
+    The states of the vehicle are a period apart, s, newest first, back to the eye's latency ago. The newest is of time
+    `now`, s.
     """
 
     def column(name: str) -> Array:

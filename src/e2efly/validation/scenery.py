@@ -86,13 +86,8 @@ class Scenery:
         """Smallest distance of a path to the obstacles of this world, m.
 
         Solids to land on do not count. Infinite: there are no obstacles. In a world of triangles, a path that goes
-        through a triangle has the distance 0.
-
-        Args:
-            position: positions of the path, each (3,), in the room, m.
-            time: times of these positions, s.
-            origin: origin of the task's world in the room.
-            within: distance beyond which obstacles may be ignored, m.
+        through a triangle has the distance 0. Positions, each (3,), are in the room, m, and times in s. Obstacles
+        farther than `within`, m, may be ignored.
         """
         if self.near is not None:
             return self.near.distance(origin.seen(np.stack(position)), within) if len(position) else math.inf
