@@ -211,13 +211,8 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         else:  # a flight controller runs at 1 kHz or more: use the mean of its outputs at start and end of the step
             at_start = law(controller, model.mixer, parts, drives)
             at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
-            mean = (
-                0.5 * at_start[0] + 0.5 * at_end[0],
-                0.5 * at_start[1] + 0.5 * at_end[1],
-                0.5 * at_start[2] + 0.5 * at_end[2],
-                0.5 * at_start[3] + 0.5 * at_end[3],
-            )
-            parts = integrate(plant, parts, mean, None, STEP)
+            a, b, c, d = (0.5 * x + 0.5 * y for x, y in zip(at_start, at_end, strict=True))
+            parts = integrate(plant, parts, (a, b, c, d), None, STEP)
         return parts, parts
 
     begin = Parts.of(first)
