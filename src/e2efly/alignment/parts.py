@@ -173,14 +173,14 @@ def _part(where: str, entry: Any, folder: Path) -> Part:
     off = {key: _at_least(f"{where}: tolerance.{key}", value, 0.0) for key, value in tolerance.items()}
     unit = None
     if shape == "mesh":
-        size = np.array([_above(f"{where}: size", entry.get("size", 1.0))])
+        size = np.array([positive(f"{where}: size", entry.get("size", 1.0))])
         unit = _mesh(where, folder / text(f"{where}: file", entry.get("file", "")))
     else:
         if "file" in entry:
             raise ValueError(f"{where}: file is {shown(entry['file'])}; accepted only where shape is 'mesh'")
         size = _size(where, shape, entry.get("size"))
     return Part(
-        name, shape, size, _above(f"{where}: mass", entry["mass"]), _places(where, entry["place"]),
+        name, shape, size, positive(f"{where}: mass", entry["mass"]), _places(where, entry["place"]),
         _turn(numbers(f"{where}: angles", entry.get("angles", [0.0, 0.0, 0.0]), 3, " of radians")),
         off.get("mass", 0.0), off.get("size", 0.0), off.get("place", 0.0), unit,
     )  # fmt: skip
@@ -210,7 +210,12 @@ def _at_least(where: str, given: Any, low: float) -> float:
     return value
 
 
-def _above(where: str, given: Any) -> float:
+def positive(where: str, given: Any) -> float:
+    """A number above zero.
+
+    Raises:
+        ValueError: naming the place, the value and what is accepted.
+    """
     value = number(where, given)
     if value <= 0:
         raise ValueError(f"{where} is {shown(given)}; accepted: a number above 0")

@@ -1,12 +1,9 @@
 """Where a policy is to fly: options of `e2efly fly`, and the course that follows from them. Imports no JAX."""
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
-
-import numpy as np
 
 from e2efly.config import TaskConfig, check_fields, number
 from e2efly.config.domain import Domain
@@ -179,13 +176,3 @@ def _check_use(contract: Contract, route: Route) -> None:
                 f"goal.{name} is {changed[name]!r}; accepted: {default!r}, as the policy commands {mode} in the world "
                 "of its training: give the pose source that origin instead"
             )
-
-
-def beside(centre: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
-    """A point (3,) at some offset from another, m."""
-    return np.add(np.asarray(centre, np.float64), away)
-
-
-def turned(yaw: float) -> np.ndarray:
-    """The unit vector (3,) of a heading, rad."""
-    return np.array([math.cos(yaw), math.sin(yaw), 0.0])

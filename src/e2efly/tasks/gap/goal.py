@@ -6,6 +6,7 @@ short side.
 
 import dataclasses
 import functools
+import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from e2efly.control.vectors import Array, Quat, namespace
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.gap import GapConfig
-from e2efly.tasks.route import Route, place, turned
+from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate
 
 WALL_WIDTH = 3.0
@@ -187,6 +188,7 @@ class GapRoute(Route):
         goal = GapGoal(GapConfig(), shape, control_period, checks=4)
         turn = Quat.of_euler(np.array([self.slit_roll]), np.zeros(1), np.array([self.slit_yaw])).stack()
         memory = GapMemory(np.array([self.slit]), turn, np.zeros(1, bool))
-        start = np.asarray(self.slit) - self.before * turned(self.slit_yaw)
+        ahead = np.array([math.cos(self.slit_yaw), math.sin(self.slit_yaw), 0.0])
+        start = np.asarray(self.slit) - self.before * ahead
         lowest = self.slit[2] - goal.config.opening[0] / 2
         return Course(goal, memory, start, heading=self.slit_yaw, lowest=lowest, clearance=0.0)
