@@ -4,7 +4,7 @@ in place of the zoo's policies, under stress.
     python benchmarks/controllers.py [--parts mujoco betaflight stress] [--flights 3] [--episodes 250] [--json FILE]
 
 Flights are of VIS-R at 100 Hz, with poses that are 30 ms old and noisy, and 10 ms from the command to the rate loop.
-INDI's rotor speeds are MuJoCo's, and on the rig its world's (`e2efly.validation.speeds`), as the SITL measures none.
+INDI's rotor speeds are MuJoCo's, and on the rig its world's (`tests.validation.speeds`), as the SITL measures none.
 Time is virtual. Parts that are not named stay as they are in the file.
 """
 
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from common import RESULTS, arguments, table, write
+from tests.validation.speeds import SpeedLink
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.control.place import Place
@@ -31,7 +32,6 @@ from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.plant import Delay, RigidState
 from e2efly.validation.plant_flight import imu_of
 from e2efly.validation.rig import POSE_NOISE, Rig
-from e2efly.validation.speeds import SpeedLink
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle

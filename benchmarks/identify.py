@@ -8,7 +8,7 @@ believes in the file, and identified from the log of its sensors (`e2efly.valida
 weighed.
 
 `--plant betaflight` flies them by the bridge's excitation mode through the real firmware
-(`e2efly.validation.firmware_excitation`), and identifies each twice: from the flight log alone,
+(`tests.validation.firmware_excitation`), and identifies each twice: from the flight log alone,
 and with the firmware's blackbox laid over it. The delay is compared with the one on the rig's own clock: the age of
 the poses, and the time from a command to the setpoint.
 `--first` is the seed of the first vehicle. A flight that ends before its excitation does is named in the JSON file,
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from common import arguments, table, write
+from tests.validation.firmware_excitation import fly_excited
 
 from e2efly.alignment.checks import checked
 from e2efly.alignment.identification import Found, identify
@@ -33,7 +34,6 @@ from e2efly.logs.telemetry import Telemetry
 from e2efly.simulation.device import prepare
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import rehearsal_settings
-from e2efly.validation.firmware_excitation import fly_excited
 from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles.loading import load_vehicle

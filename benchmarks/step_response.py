@@ -3,7 +3,7 @@
     python benchmarks/step_response.py [--vehicle vis_r] [--log steps.csv]
 
 The paper's figure of the step-response alignment, with the firmware in the place of the vehicle: it flies over the
-rigid body of the vehicle's file (`e2efly.validation.steps`), `e2efly.alignment.alignment` fits delay and rate loop to
+rigid body of the vehicle's file (`tests.validation.steps`), `e2efly.alignment.alignment` fits delay and rate loop to
 the log, and docs/step_response.png shows the mean of four steps of each command. `--log` keeps the flight as CSV.
 The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps.
 """
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from common import arguments, table, write
 from PIL import Image
+from tests.validation.steps import HOLD_S, SetpointStep, fly_steps
 
 from e2efly.alignment.alignment import LEAD_S, Alignment, align
 from e2efly.alignment.checks import checked
@@ -30,7 +31,6 @@ from e2efly.simulation.device import prepare
 from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
-from e2efly.validation.steps import HOLD_S, SetpointStep, fly_steps
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.alignment_plots import AFTER, ASKED, BEFORE, MEASURED, both

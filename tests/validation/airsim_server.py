@@ -218,7 +218,9 @@ class _Connection(socketserver.BaseRequestHandler):
         _, number, method, parameters = message
         self._served.calls.append((method, parameters))
         error, result = None, None
-        methods = {**METHODS, **DIALECTS[self._served.world.version].image_methods}
+        dialect = DIALECTS[self._served.world.version]
+        images = {"simGetImages": dialect.image_parameters, "simGetCameraInfo": dialect.camera_parameters}
+        methods = {**METHODS, **images}
         if method not in methods:
             count = len(parameters)
             error = f"rpclib: server could not find function '{method}' with argument count {count}."

@@ -17,9 +17,9 @@ from e2efly.logs.readers import read_flights
 from e2efly.logs.telemetry import Telemetry
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
-from e2efly.validation.firmware_excitation import fly_excited
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
+from tests.validation.firmware_excitation import fly_excited
 
 FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(FILE, mass=0.85, inertia=FILE.inertia * 1.2, motor_time_constant=0.045, latency=0.05)

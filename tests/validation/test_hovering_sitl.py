@@ -15,8 +15,8 @@ from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
-from e2efly.validation.speeds import SpeedLink
 from e2efly.vehicles.loading import load_vehicle
+from tests.validation.speeds import SpeedLink
 
 VEHICLE, LATENCY = load_vehicle("vis_r"), 0.03
 WIND = np.array([3.0, 0.0, 0.0])

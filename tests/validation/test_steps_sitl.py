@@ -10,8 +10,8 @@ from e2efly.alignment.checks import checked
 from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import Rig
-from e2efly.validation.steps import SIZES, fly_steps
 from e2efly.vehicles.loading import load_vehicle
+from tests.validation.steps import SIZES, fly_steps
 
 VEHICLE = load_vehicle("vis_r")
 

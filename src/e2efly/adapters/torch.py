@@ -55,13 +55,7 @@ class TorchEnv:
     """
 
     def __init__(self, task: str | TrainConfig = "hover", num_envs: int = 64, raw: bool = False) -> None:
-        """Create the environments.
-
-        Args:
-            task: the name of a task or a reference to it, with its preset for PPO. Or a configuration, of which only
-                the task, the reward and the environment are used.
-            num_envs: number of vehicles.
-            raw: return observations as measured, not as features (`learn.networks.Features`).
+        """Create the environments. The arguments are those of `e2efly.adapters.gym.QuadrotorVectorEnv`.
 
         Raises:
             ValueError: naming the field, the value and what is accepted.
@@ -89,9 +83,7 @@ class TorchEnv:
     def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
         """Simulate one control step, with a new start where an episode ended.
 
-        Args:
-            state: returned by `reset` or by the last step.
-            action: (n, 4), in [-1, 1]. Values outside are clipped.
+        The state comes from `reset` or the last step. Actions, (n, 4), are clipped to [-1, 1].
 
         Raises:
             ValueError: for actions of another shape or type.

@@ -136,9 +136,7 @@ def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarr
 def clearest(record: Record, channel: int) -> Stretches:
     """The section around the largest sudden change of a command that follows a calm period.
 
-    Args:
-        record: the flight.
-        channel: 0: thrust over mass, 1 to 3: body rate about x, y, z.
+    The channels are 0: thrust over mass, and 1 to 3: body rate about x, y, z.
     """
     sent, rates = record.streams["command"], record.streams["body_rate"]
     first, last = (f(s.time[i] for s in (sent, rates)) for f, i in ((max, 0), (min, -1)))

@@ -47,10 +47,6 @@ _GRID = 0.005
 def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
     """The flights, reduced to the parts that can be used. Their notes say what was cut.
 
-    Args:
-        records: the records as read.
-        vehicle: the vehicle, for the geometry of its rotors.
-
     Raises:
         ValueError: naming the file, what is wrong with it, and what is accepted.
     """
@@ -93,8 +89,7 @@ def _within_limits(record: Record) -> Record:
             worst = float(np.max(np.abs(stream.values)))
             raise ValueError(
                 f"{record.path}: {name} is up to {worst:.4g}{unit}, and beyond what a quadrotor can do in "
-                f"{percent(bad.mean())} of its samples; accepted: up to {LIMITS[name]:g}{unit} "
-                "(are the units "
+                f"{percent(bad.mean())} of its samples; accepted: up to {LIMITS[name]:g}{unit} (are the units "
                 "right? Splines through gaps overshoot like this, too)"
             )
         if bad.any():
@@ -351,8 +346,7 @@ def _on_one_clock(record: Record) -> Record:
     if len(known) == 2 and abs(known[1] - known[0]) > DRIFT:
         raise ValueError(
             f"{record.path}: the poses are {1e3 * known[0]:.0f} ms behind the gyroscope at first and "
-            f"{1e3 * known[1]:.0f} ms "
-            f"at the end: their clocks run apart; accepted: {1e3 * DRIFT:g} ms over a flight"
+            f"{1e3 * known[1]:.0f} ms at the end: their clocks run apart; accepted: {1e3 * DRIFT:g} ms over a flight"
         )
     if abs(whole) < 1e-3:
         return record

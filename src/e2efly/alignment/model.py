@@ -113,13 +113,10 @@ class Model:
 
     @staticmethod
     def of(vehicle: Vehicle, driver: str, believed: Vehicle | None = None, only: tuple[str, ...] = ()) -> "Model":
-        """The model of a vehicle.
+        """The model of a vehicle that a stream drives.
 
-        Args:
-            vehicle: what is known of the vehicle that flies.
-            driver: the stream that drives it.
-            believed: the vehicle that its flight controller assumes. If omitted, the same vehicle.
-            only: names of the unknowns to estimate. If omitted, all that the flights can show.
+        `believed` is the vehicle that its flight controller assumes; if omitted, the same vehicle. `only` names the
+        unknowns to estimate; if omitted, they are all that the flights can show.
         """
         believed = vehicle if believed is None else believed
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
@@ -214,13 +211,8 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         else:  # a flight controller runs at 1 kHz or more: use the mean of its outputs at start and end of the step
             at_start = law(controller, model.mixer, parts, drives)
             at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
-            mean = (
-                0.5 * at_start[0] + 0.5 * at_end[0],
-                0.5 * at_start[1] + 0.5 * at_end[1],
-                0.5 * at_start[2] + 0.5 * at_end[2],
-                0.5 * at_start[3] + 0.5 * at_end[3],
-            )
-            parts = integrate(plant, parts, mean, None, STEP)
+            a, b, c, d = (0.5 * x + 0.5 * y for x, y in zip(at_start, at_end, strict=True))
+            parts = integrate(plant, parts, (a, b, c, d), None, STEP)
         return parts, parts
 
     begin = Parts.of(first)

@@ -56,7 +56,6 @@ class Prototype:
     mass_sigma: float
     centre: np.ndarray
     """Centre of mass, relative to the origin of the list, FLU, (3,) m."""
-    centre_sigma: np.ndarray
     inertia: np.ndarray
     """Inertia about the centre of mass, body axes, (3, 3) kg*m^2."""
     inertia_sigma: np.ndarray
@@ -94,14 +93,14 @@ SHAPES: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
 by the mass, m^2. The axis of cylinders and tubes is their own z axis."""
 
 
-def prototype(parts: tuple[Part, ...], seed: int = 0) -> Prototype:
+def prototype(parts: tuple[Part, ...]) -> Prototype:
     """Combine the parts. The standard deviations come from a Monte Carlo simulation over the tolerances, which are
     assumed to be independent.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     one = tuple(x[0] for x in _add(parts, np.zeros, 1))
     drawn = [x.std(0) for x in _add(parts, rng.standard_normal, DRAWS)]
-    return Prototype(float(one[0]), float(drawn[0]), one[1], drawn[1], one[2], drawn[2])
+    return Prototype(float(one[0]), float(drawn[0]), one[1], one[2], drawn[2])
 
 
 def _add(
@@ -174,14 +173,14 @@ def _part(where: str, entry: Any, folder: Path) -> Part:
     off = {key: _at_least(f"{where}: tolerance.{key}", value, 0.0) for key, value in tolerance.items()}
     unit = None
     if shape == "mesh":
-        size = np.array([_above(f"{where}: size", entry.get("size", 1.0))])
+        size = np.array([positive(f"{where}: size", entry.get("size", 1.0))])
         unit = _mesh(where, folder / text(f"{where}: file", entry.get("file", "")))
     else:
         if "file" in entry:
             raise ValueError(f"{where}: file is {shown(entry['file'])}; accepted only where shape is 'mesh'")
         size = _size(where, shape, entry.get("size"))
     return Part(
-        name, shape, size, _above(f"{where}: mass", entry["mass"]), _places(where, entry["place"]),
+        name, shape, size, positive(f"{where}: mass", entry["mass"]), _places(where, entry["place"]),
         _turn(numbers(f"{where}: angles", entry.get("angles", [0.0, 0.0, 0.0]), 3, " of radians")),
         off.get("mass", 0.0), off.get("size", 0.0), off.get("place", 0.0), unit,
     )  # fmt: skip
@@ -211,7 +210,12 @@ def _at_least(where: str, given: Any, low: float) -> float:
     return value
 
 
-def _above(where: str, given: Any) -> float:
+def positive(where: str, given: Any) -> float:
+    """A number above zero.
+
+    Raises:
+        ValueError: naming the place, the value and what is accepted.
+    """
     value = number(where, given)
     if value <= 0:
         raise ValueError(f"{where} is {shown(given)}; accepted: a number above 0")

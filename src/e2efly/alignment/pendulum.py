@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.parts import positive
 from e2efly.config.tables import number, read_table, shown
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -53,12 +54,12 @@ def _axis(where: str, entry: Any) -> tuple[float, float, tuple[float, float]]:
         raise ValueError(f"{where} is {shown(entry)}; accepted: a table of {', '.join(sorted(_KEYS))}")
     if missing := [key for key in ("mass", "length", "distance", "periods") if key not in entry]:
         raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
-    m, length, distance = (_positive(where, entry, key) for key in ("mass", "length", "distance"))
+    m, length, distance = (positive(f"{where}: {key}", entry[key]) for key in ("mass", "length", "distance"))
     off = {
         key: float(number(f"{where}: {key}_sigma", entry.get(f"{key}_sigma", 0.0)))
         for key in ("mass", "length", "distance")
     }
-    count = _positive(where, entry, "count") if "count" in entry else 1.0
+    count = positive(f"{where}: count", entry["count"]) if "count" in entry else 1.0
     listed = entry["periods"]
     if not isinstance(listed, list) or len(listed) < 3:
         raise ValueError(
@@ -71,17 +72,9 @@ def _axis(where: str, entry: Any) -> tuple[float, float, tuple[float, float]]:
     if np.any(np.abs(times / period - 1) > 0.1):
         raise ValueError(
             f"{where}: periods is {shown(listed)}: they differ by more than 10 % from their median, "
-            f"{period * count:.3g} s; "
-            "accepted: the same number of periods each time"
+            f"{period * count:.3g} s; accepted: the same number of periods each time"
         )
     inertia = m * GRAVITY * (distance / 2) ** 2 * np.mean(times) ** 2 / (4 * np.pi**2 * length)
     timing = np.std(times, ddof=1) / np.sqrt(len(times)) / period
     parts = [2 * timing, off["mass"] / m, off["length"] / length, 2 * off["distance"] / distance, SPREAD]
     return float(inertia), float(inertia * np.sqrt(np.sum(np.square(parts)))), (m, off["mass"])
-
-
-def _positive(where: str, entry: dict[str, Any], key: str) -> float:
-    value = number(f"{where}: {key}", entry[key])
-    if value <= 0:
-        raise ValueError(f"{where}: {key} is {shown(entry[key])}; accepted: a number above 0")
-    return value

@@ -48,12 +48,9 @@ class Stretches:
 
 
 def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float) -> Stretches:
-    """Sections of a flight.
+    """Sections of a flight with commands and body rates, of a length in s.
 
-    Args:
-        record: the flight, with commands and body rates.
-        begin: (n,) start times, s of the record's clock, increasing.
-        length: length of each section, s.
+    `begin` are (n,) increasing start times, s of the record's clock.
     """
     begin, past, m = np.asarray(begin, float), past_steps(), round(length / STEP)
     around = begin[:, None] + STEP * np.arange(-past, m + 1)
@@ -72,16 +69,10 @@ def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float
 
 
 def replay(model: Model, p: np.ndarray, flown: Stretches) -> dict[str, np.ndarray]:
-    """The motion of the simulated vehicle in each section, by stream, (n, m + 1, k): open loop, from the measured
-    start.
+    """The motion of the simulated vehicle in each section, by stream, (n, m + 1, k).
 
-    The rotors begin with the speeds that result from the commands and the body rates before the start. If the log has
-    no poses, the vehicle begins level and at rest.
-
-    Args:
-        model: a model driven by commands.
-        p: (u,) its unknowns.
-        flown: the sections.
+    It is driven by commands in open loop, from the measured start. The rotors begin with the speeds that result from
+    the commands and the body rates before the start. If the log has no poses, the vehicle begins level and at rest.
     """
     n = len(flown.begin)
     window: dict[str, Any] = {"driven": flown.driven, "when": np.zeros(n), "before": flown.rate_before}

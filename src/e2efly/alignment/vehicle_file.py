@@ -42,14 +42,9 @@ def write_vehicle(
     found: Mapping[str, Estimate],
     correlation: tuple[list[str], np.ndarray] = ([], np.zeros((0, 0))),
 ) -> Vehicle:
-    """Write the vehicle file.
+    """Write the new vehicle file. Values of the base keep their sources.
 
-    Args:
-        path: path of the new TOML file.
-        base_name: the name or path of the base. Its values keep their sources.
-        base: the loaded base.
-        found: the estimates, by field.
-        correlation: names of entries and their correlation matrix, as `e2efly.vehicles.posterior` reads them.
+    `found` are the estimates by field. `correlation` is as `e2efly.vehicles.posterior` reads it.
 
     Raises:
         ValueError: as for `merged`.

@@ -78,12 +78,7 @@ def past_steps() -> int:
 def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None, length: float = 0.0) -> Windows:
     """Consecutive windows of a flight. Windows in which the driving stream has a gap are left out.
 
-    Args:
-        record: the flight.
-        driver: what drives the simulation (`Model.driver`).
-        flight: number of the flight.
-        volts: battery voltage to which motor outputs are scaled, V. If omitted, they are used as they are.
-        length: length of a window, s. 0: the length that suits the driver.
+    Motor outputs are scaled to `volts`, V, if given. A length of 0 s is the one that suits the driver (`Model.driver`).
     """
     m, past = round((length or LENGTHS.get(driver, LENGTH)) / STEP), past_steps()
     names = [name for name in MEASURED if record.has(name)]

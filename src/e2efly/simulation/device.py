@@ -104,8 +104,7 @@ def cores() -> int:
 def processor(told: str | None = None) -> tuple[str, bool | None]:
     """The model of the processor, and whether it has AVX-512, which determines the cost of physics. None: not known.
 
-    Args:
-        told: the system's description of its processors. If left out: /proc/cpuinfo, if it exists.
+    `told` is the system's description of its processors. If left out: /proc/cpuinfo, if it exists.
     """
     file = Path("/proc/cpuinfo")
     told = told if told is not None else file.read_text(encoding="utf-8") if file.exists() else ""

@@ -384,10 +384,8 @@ def reward(
 ) -> tuple[Scalar, dict[str, Scalar]]:
     """The weighted sum of the terms, and each weighted term.
 
-    Args:
-        weights: one weight per term. It is an array leaf, so that changing it does not recompile.
-        parameters: constants of the terms that differ from their defaults.
-        signals: the signals of the step, by name.
+    Weights are array leaves, so that changing one does not recompile. `parameters` are constants of the terms that
+    differ from their defaults.
 
     Raises:
         ValueError: when a term needs a signal that the task does not have.

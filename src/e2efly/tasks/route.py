@@ -1,12 +1,9 @@
 """Where a policy is to fly: options of `e2efly fly`, and the course that follows from them. Imports no JAX."""
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
-
-import numpy as np
 
 from e2efly.config import TaskConfig, check_fields, number
 from e2efly.config.domain import Domain
@@ -22,7 +19,6 @@ from e2efly.vehicles.vehicle import Vehicle
 
 UNDECLARED = "The policy does not say for which courses it was trained."
 ANYWAY = "accepted: a course within these ranges, or goal.outside (--goal.outside), which flies it all the same"
-_ORIGIN = ("origin", "origin_yaw")
 
 
 def place(default: Any) -> Any:
@@ -69,14 +65,11 @@ class Route:
     def drawn(cls, course: Course, file: Path) -> "Route":
         """The options that give a course which a training environment has drawn.
 
-        Args:
-            course: the course as drawn.
-            file: path of a .toml file that is written if the options need a file: a track.
+        If the options need a file, a track, it is written to the path of a .toml file.
 
         Raises:
             OSError: when the file cannot be written.
         """
-        del course, file
         return cls()
 
     def unused(self) -> tuple[str, ...]:
@@ -131,10 +124,7 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
     """The course that a policy was trained to fly, at the place that the options give.
 
-    Args:
-        contract: the policy's contract. Its task determines which options there are.
-        vehicle: the vehicle that flies. Its feet height and its size are used.
-        route: where to fly. If left out: where the training was.
+    Without a route, it is where the training was. The vehicle matters by its feet height and its size.
 
     Raises:
         ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,
@@ -186,13 +176,3 @@ def _check_use(contract: Contract, route: Route) -> None:
                 f"goal.{name} is {changed[name]!r}; accepted: {default!r}, as the policy commands {mode} in the world "
                 "of its training: give the pose source that origin instead"
             )
-
-
-def beside(centre: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
-    """A point (3,) at some offset from another, m."""
-    return np.add(np.asarray(centre, np.float64), away)
-
-
-def turned(yaw: float) -> np.ndarray:
-    """The unit vector (3,) of a heading, rad."""
-    return np.array([math.cos(yaw), math.sin(yaw), 0.0])

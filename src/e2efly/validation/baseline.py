@@ -51,12 +51,7 @@ class Baseline:
 
     @staticmethod
     def of(contract: Contract, name: str, vehicle: Vehicle) -> "Baseline":
-        """A hover controller that flies the task of a contract.
-
-        Args:
-            contract: contract of the policy that it replaces.
-            name: name of the controller, or its reference.
-            vehicle: the vehicle as the policy knows it.
+        """A hover controller that flies the task of a contract in place of its policy, by its name or its reference.
 
         Raises:
             ValueError: for an unknown name, with all names; or for a task or a command mode that it cannot fly.
@@ -96,7 +91,6 @@ class Baseline:
         Returns:
             The action, float32 (4,) or (n, 4) in [-1, 1]; the memory for the next call.
         """
-        del images
         x, slices, dt = np.asarray(observation, np.float64), self.contract.slices, 1 / self.contract.control_rate_hz
         attitude, velocity = Quat.of(x[..., slices[ATTITUDE.name]]), Vec3.of(x[..., slices[VELOCITY.name]])
         latency, force, under_way = self.contract.latency_of(self.vehicle), None, UnderWay()
@@ -119,12 +113,7 @@ def _aims(goal: type[Goal]) -> bool:
 
 
 def acting(policy: Policy, baseline: str | None, vehicle: Vehicle) -> Policy | Baseline:
-    """The policy, or the hover controller that flies in its place.
-
-    Args:
-        policy: as loaded.
-        baseline: name or reference of the controller. None: the policy flies.
-        vehicle: the vehicle as the policy knows it.
+    """The policy, or the hover controller of this name or reference that flies in its place. None: the policy flies.
 
     Raises:
         ValueError: as for `Baseline.of`.

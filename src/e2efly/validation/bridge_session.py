@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,7 +80,6 @@ class Session:
         course: Course | None = None,
         log: Log | None = None,
         link: Link | None = None,
-        wrap_worker: Callable[[PolicyWorker], Any] | None = None,
         source: Any = None,
         cameras: Sequence[ImageSource] = (),
         commands: CommandSource | None = None,
@@ -185,20 +183,11 @@ def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], 
 
 
 def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
-    """Settings of whole flights on the rig. The firmware on the rig has no battery.
+    """Settings of whole flights on the rig, at this height above the ground, m. The firmware on the rig has no battery.
 
-    Args:
-        height: height of the hover above the ground, m.
-        reach: radius of the fence about the origin, m.
+    `reach` is the radius of the fence about the origin, m.
     """
     fence = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
     return dataclasses.replace(
         FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True, fence=fence,
     )  # fmt: skip
-
-
-def flight_folder(base: Path, name: str) -> Path:
-    """Make a folder for one firmware."""
-    folder = base / name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder

@@ -189,16 +189,7 @@ def candidate(
     task: Mapping[str, Any] | None = None,
     baseline: str | None = None,
 ) -> Candidate:
-    """Find a policy, and the task and environment in which it is judged.
-
-    Args:
-        policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
-        vehicle: the vehicle that flies, a name or a .toml file. If omitted, the policy's own vehicle.
-        controller: the vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever
-            flies. plant: the vehicle that flies.
-        env: environment options to change from the run or the contract, by dotted name.
-        task: task options to change likewise: {"track": "four_gates"}.
-        baseline: the hover controller that flies in place of the policy, under its contract. None: the policy flies.
+    """Find a policy, and the task and environment in which it is judged. The arguments are those of `evaluate`.
 
     Raises:
         ValueError: when there is no such policy, for changes that the contract does not allow, and when the vehicle
@@ -244,7 +235,6 @@ def _flown_by(found: Candidate, baseline: str) -> Candidate:
 
 
 def _hash(vehicle: str) -> str:
-    """The hash of a vehicle or a family."""
     family = load_family(vehicle)
     return load_vehicle(vehicle).hash if family is None else family.hash
 
@@ -256,11 +246,7 @@ def _trained_on(policy: Policy) -> str | None:
 
 
 def with_changes(own: EnvConfig, changes: Mapping[str, Any]) -> EnvConfig:
-    """The environment of a policy with changes that do not affect its observation, its images and its commands.
-
-    Args:
-        own: the environment of its run or its contract.
-        changes: the new values, by dotted name.
+    """A policy's environment with changes, by dotted name, that leave its observation, images and commands alone.
 
     Raises:
         ValueError: naming the field, its value and what is accepted.
@@ -398,11 +384,7 @@ def fly_criteria(
 ) -> tuple[dict[str, Episodes], dict[str, State], dict[str, dict[str, np.ndarray]]]:
     """Fly `episodes` starts of every criterion of a task.
 
-    Args:
-        found: the policy, its task and environment.
-        episodes: number of starts per criterion.
-        seed: the seed of the starts.
-        kept: bytes that the caller keeps for every start, in addition to the figures.
+    `kept` counts the bytes that the caller keeps for every start, in addition to the figures.
 
     Returns:
         For each criterion name: the results of the episodes, their starts, and what else they drew; NumPy arrays.
@@ -469,9 +451,7 @@ def check_observation(policy: Acting, env: Any) -> None:
 def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:
     """Task and environment from the contract of a policy.onnx without a run. The task has the options of its preset.
 
-    Args:
-        policy: the loaded policy.
-        vehicle: the vehicle that is to fly. It may be the file of the vehicle that the policy was trained on.
+    `vehicle` is the vehicle that is to fly. It may be the file of the vehicle that the policy was trained on.
 
     Raises:
         ValueError: when the vehicle that it was trained on cannot be found.
@@ -504,7 +484,6 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
 
 
 def _camera(image: Image) -> CameraConfig:
-    """The camera options for an image of a contract."""
     known: dict[str, Any] = {"sees": image.sees, "projection": image.projection}
     known |= {"of": image.of} if image.of != NONE else {}
     known |= {"encoding": image.encoding} if image.encoding != NONE else {}

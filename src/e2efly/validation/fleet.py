@@ -90,14 +90,9 @@ def fly_all(
     done: Callable[[int], None] = lambda count: None,
     processes: int | None = None,
 ) -> list[Trajectory]:
-    """Fly every start, in order.
+    """Fly every start, in order. `done` is called with the number of finished flights.
 
-    Args:
-        mission: what the flights share.
-        flights: the starts and their courses.
-        done: called with the number of finished flights.
-        processes: number of processes at once. If left out: one per core, or only this process if more are not worth
-            it.
+    Without a number of processes, there is one per core, or only this process if more are not worth it.
 
     Raises:
         ValueError: for a policy or a plant that cannot be loaded, for a plant that cannot fly the realities, and for

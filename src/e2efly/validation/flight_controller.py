@@ -19,12 +19,9 @@ class FlightController:
     """Maps commands to rotor thrusts, for the vehicle to which it is tuned."""
 
     def __init__(self, vehicle: Vehicle, command_mode: str, plain_mixer: bool = False) -> None:
-        """Make the controller. Call `start` before the first `thrusts`.
+        """Make the controller, tuned to a vehicle, for a mode of `COMMAND_MODES`.
 
-        Args:
-            vehicle: the vehicle to which it is tuned.
-            command_mode: a name of `COMMAND_MODES`.
-            plain_mixer: as for `RateLoop`.
+        Call `start` before the first `thrusts`.
 
         Raises:
             KeyError: for an unknown command mode.

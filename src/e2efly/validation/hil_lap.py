@@ -168,15 +168,10 @@ class Verdict:
 
 
 def verdict(course: Course, scenery: Scenery, motion: Truth, began: float, period: float, radius: float) -> Verdict:
-    """Let the task judge a true motion.
+    """Let the task judge the true motion in the policy's flight.
 
-    Args:
-        course: the course to fly.
-        scenery: the world.
-        motion: the true motion in the policy's flight.
-        began: time at which the world's time was 0, monotonic clock, s.
-        period: period of the control steps, s.
-        radius: radius of the vehicle, m.
+    `began` is the time at which the world's time was 0, monotonic clock, s; `period` that of the control steps, s;
+    `radius` that of the vehicle, m.
     """
     steps = motion.every(period)
     count, goal, memory = len(steps.time), course.goal, course.memory
@@ -247,17 +242,9 @@ def lap_of(
     heard: Heard, course: Course, scenery: Scenery, period: float, radius: float, folder: Path, seed: int,
     kill: Victim | None,
 ) -> Lap:  # fmt: skip
-    """The results of a flight, from its records.
+    """The results of a flight, from the notes taken and the files in its folder, as far as they exist.
 
-    Args:
-        heard: the notes taken during the flight.
-        course: the course to fly.
-        scenery: the world.
-        period: period of the policy's control steps, s.
-        radius: radius of the vehicle, m.
-        folder: folder with `flight.mcap`, `truth.csv` and `node.json`, as far as they exist.
-        seed: seed of the world.
-        kill: the process that was killed.
+    `period` is that of the control steps, s; `radius` that of the vehicle, m.
     """
     truth, node = folder / "truth.csv", folder / "node.json"
     motion = Truth.read(truth) if truth.is_file() else None

@@ -16,12 +16,9 @@ SAMPLE = 0.004
 
 
 def motion_streams(time: np.ndarray, states: Sequence[RigidState], rotor_speed: np.ndarray) -> dict[str, Stream]:
-    """Streams of a flight without errors.
+    """Streams of a flight without errors, from the states at times (n,), s, in equal or nearly equal steps.
 
-    Args:
-        time: (n,) s, in equal or nearly equal steps.
-        states: the states at these times.
-        rotor_speed: (n, 4) rad/s. NaN if the plant does not give rotor speeds, which are then left out.
+    Rotor speeds, (n, 4) rad/s, are NaN if the plant does not give them, and then left out.
     """
     velocity, attitude = np.array([s.velocity for s in states]), np.array([s.quaternion for s in states])
     change = np.gradient(velocity, time, axis=0) + np.array([0.0, 0.0, GRAVITY])
@@ -40,10 +37,7 @@ def motion_streams(time: np.ndarray, states: Sequence[RigidState], rotor_speed: 
 def record_of(path: Path, flight: Trajectory, mode: str) -> Record:
     """The log of a flight that has kept its samples.
 
-    Args:
-        path: path of the log's file.
-        flight: as `fly` returns it with `sample`.
-        mode: the command mode. For ctbr the log contains the commands, at the times when they were sent.
+    In the command mode ctbr it contains the commands, at the times when they were sent.
     """
     streams = motion_streams(
         np.array([s.time for s in flight.samples]),

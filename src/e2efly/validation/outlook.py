@@ -35,14 +35,7 @@ class Outlook:
 
     @staticmethod
     def of(env: Env, memory: Any, eyes: tuple[Eye, ...], seed: int) -> "Outlook":
-        """The world of an episode.
-
-        Args:
-            env: the training's environment.
-            memory: the task's state at its start, leaves (1, ...).
-            eyes: how the cameras are mounted, leaves (1, ...).
-            seed: seed of the noise.
-        """
+        """The world of an episode, from the task's state and the mounted cameras at its start, leaves (1, ...)."""
         shapes = jax.eval_shape(lambda key: env.reset(key, 1)[0], jax.random.key(0))
         blank = dataclasses.replace(shapes, key=None, memory=None, eyes=None)
         zeros = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), blank)
@@ -55,13 +48,9 @@ class Outlook:
         return dataclasses.replace(self, world=jax.device_put(world))
 
     def images(self, state: RigidState, time: float, count: int, which: tuple[int, ...]) -> list[np.ndarray]:
-        """The cameras' images without latency.
+        """The cameras' images without latency, from a state in this world at a time of the world, s.
 
-        Args:
-            state: state of the vehicle, in this world.
-            time: time of the world, s.
-            count: number of images so far. Each image has other noise.
-            which: numbers of the cameras.
+        `count` is the number of images so far, because each image has other noise. `which` are numbers of the cameras.
 
         Returns:
             One image for each camera: (h, w), or (h, w, 3) for colours.

@@ -273,11 +273,13 @@ class Delay:
         return replace(self, acting=acting, coming=coming), parts
 
 
-def check_mode(mode: str, plant: str) -> None:
-    """Refuse an unknown command mode.
+def check_mode(mode: str, plant: str, rates: bool = False) -> None:
+    """Refuse an unknown command mode. With `rates`, also one that does not lead to body rates and thrust.
 
     Raises:
-        ValueError: naming the plant, the mode and all modes.
+        ValueError: naming the plant, the mode and what is accepted.
     """
     if mode not in COMMAND_MODES:
         raise ValueError(f"plant {plant!r}: " + unknown("command mode", mode, COMMAND_MODES))
+    if rates and COMMAND_MODES[mode].controller is None:
+        raise ValueError(f"plant {plant!r} takes no {mode!r} commands; accepted: policies of other modes")

@@ -63,25 +63,18 @@ def fly_excitation(
     speed: float = 5.0,
     sag: float = 0.0,
     pulses: bool = True,
-    start: tuple[float, float, float] = (0.0, 0.0, 50.0),
 ) -> Record:
-    """Fly lines and doublets, and record everything without errors.
+    """Fly lines and doublets on a plant in the command mode ctbr, and record everything without errors.
 
-    Args:
-        plant: the vehicle that flies, in the command mode ctbr. Its flight controller is tuned to `believed`.
-        believed: the vehicle whose gains are used to steer, softened for a vehicle that is not known.
-        latency: time from sending a command to the rate loop, s.
-        seconds: duration of the flight, s.
-        speed: speed of the fastest line, m/s.
-        sag: share of the thrust that is lost by the end, at a constant rate.
-        pulses: whether doublets are added.
-        start: start position, m.
+    The plant's flight controller is tuned to `believed`, whose gains steer, softened for a vehicle that is not known.
+    `latency` is the time from sending a command to the rate loop, s; `speed` that of the fastest line, m/s; `sag` the
+    share of the thrust that is lost by the end, at a constant rate.
     """
     steer = softened(believed)
     wanted = COMMAND_MODES["velocity"].controller
     assert wanted is not None
     hover = np.array([GRAVITY, 0.0, 0.0, 0.0])
-    plant.reset(RigidState(np.array(start), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+    plant.reset(RigidState(np.array([0.0, 0.0, 50.0]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
     delay, ticks = Delay.of(latency, hover), round(RATE / COMMANDS)
     states, rotors, commands, trim = [], [], [], 0.0
     for k in range(round(seconds * RATE)):

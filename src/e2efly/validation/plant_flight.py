@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
+from e2efly.policy.goal import Body
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.reality import Air
@@ -143,7 +144,7 @@ def fly(
     )  # fmt: skip
 
 
-def imu_of(before: RigidState, after: RigidState, dt: float) -> Imu:
+def imu_of(before: Body, after: Body, dt: float) -> Imu:
     """The measurement of a perfect IMU, as in training (`e2efly.simulation.sensors.imu`).
 
     It is the body rate, and the mean specific force of the last `dt` s in the present body axes. A vehicle that has

@@ -40,11 +40,10 @@ class Sight:
     """Seed of the noise."""
 
     def begin(self, taken: Mapping[int, Callable[[float], np.ndarray]] | None = None) -> "PlantWatch":
-        """The watch for a flight that begins.
+        """The watch for a flight that begins. Without `taken`, all images are rendered.
 
-        Args:
-            taken: for the plant's own cameras: by the camera's number, a function from the time since the start, s, to
-                the newest image. None: all images are rendered.
+        For the plant's own cameras, `taken` has functions by their number, from the time since the start, s, to the
+        newest image.
         """
         return PlantWatch(self, taken or {})
 
@@ -72,9 +71,7 @@ class PlantWatch:
     def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
         """The policy's images in control step `k`: for each camera the newest image, (h, w) or (h, w, 3).
 
-        Args:
-            k: the step. Steps must be requested in order.
-            states: states of the vehicle, one per control step until now. The last one is the present state.
+        Steps must be requested in order. `states` are those of the vehicle until now, one per control step.
         """
         sight = self.sight
         for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
@@ -101,14 +98,8 @@ def rendered(
 ) -> np.ndarray:
     """A camera's image as the environment renders it, from the pose and the world of a latency ago.
 
-    Args:
-        camera: the camera.
-        eye: how it is mounted on the vehicle: leaves (1, ...).
-        scene: one world.
-        states: states of the vehicle, a period apart, newest first, back to the eye's latency ago.
-        now: time of the newest state, s.
-        period: time between the states, s.
-        key: key of the noise.
+    The states of the vehicle are a period apart, s, newest first, back to the eye's latency ago. The newest is of time
+    `now`, s.
     """
 
     def column(name: str) -> Array:

@@ -107,15 +107,7 @@ def lacking(kind: type[Plant], row: StressRow) -> str:
 
 
 def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float) -> list[Reality]:
-    """The conditions of a row's flights.
-
-    Args:
-        drawn: the draws of the row.
-        vehicle: the vehicle of the nominal row.
-        seed: seed of the starts.
-        steps: control steps of the longest flight.
-        period: control period, s.
-    """
+    """The conditions of the flights of a row, which last at most `steps` periods, s. The vehicle is the nominal one."""
     key, n = random_key(seed, UNSEEN, 0), len(drawn.latency)
     gust, drift, share = (np.asarray(x, np.float64) for x in _tracks(drawn.disturbance, key, steps, period))
     noise = np.stack([np.asarray(x, np.float64)[:, 0] for x in vars(drawn.noise).values()], axis=1)  # (n, 4)

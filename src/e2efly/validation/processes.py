@@ -50,10 +50,8 @@ def free_port() -> int:
 def flags(prefix: str, options: Any, default: Any = None) -> list[str]:
     """A configuration as options of a command: the fields that differ from the default.
 
-    Args:
-        prefix: beginning of the options' names, such as `goal`.
-        options: a frozen dataclass of numbers, texts, flags, tuples of them, and such dataclasses.
-        default: the configuration to compare with. None: the defaults of the class.
+    It is a frozen dataclass of numbers, texts, flags, tuples of them, and such dataclasses. `prefix` begins the names
+    of the options. Without a default, it is that of the class.
     """
     default, found = type(options)() if default is None else default, list[str]()
     for field in dataclasses.fields(options):
@@ -81,13 +79,10 @@ class Program:
     """
 
     def __init__(self, name: str, command: Sequence[str], core: int | None = None, *, urgent: bool = False) -> None:
-        """Start the program.
+        """Start `python` with these arguments. The name is for error texts.
 
-        Args:
-            name: name for error texts.
-            command: the arguments after `python`.
-            core: the only core that it may use. None: any core.
-            urgent: whether it has priority over ordinary programs, where this is allowed, with all its threads.
+        With a core, it may use only that one. `urgent` gives it, with all its threads, priority over ordinary programs,
+        where this is allowed.
         """
         self.name = name
         self.process = subprocess.Popen(
@@ -153,7 +148,7 @@ class Program:
         self.process.send_signal(by)
         return self._status(seconds)
 
-    def leave(self, seconds: float = 10.0) -> int | None:
+    def leave(self) -> int | None:
         """Close its standard input, which ends the programs of a room.
 
         Returns its exit status, or None as for `end`.
@@ -161,7 +156,7 @@ class Program:
         assert self.process.stdin is not None
         with suppress(OSError):
             self.process.stdin.close()
-        return self._status(seconds)
+        return self._status(10.0)
 
     def _status(self, seconds: float) -> int | None:
         try:
@@ -202,12 +197,8 @@ class Room:
     ) -> None:  # fmt: skip
         """Start it and wait until the firmware can be armed.
 
-        Args:
-            vehicle: a name or a .toml file.
-            seed: seed of the poses' noise.
-            options: further options of `room_process`.
-            core: the only core that the room and the firmware may use. None: any one core.
-            pose_port: UDP port to which it sends poses. None: a free one.
+        `options` are further ones of `room_process`. The room and the firmware use only one core, `core` if it is
+        given. Without a port, the poses go to a free one.
 
         Raises:
             RuntimeError: when it does not start, with its last lines.
@@ -297,16 +288,9 @@ def bridge(
     *,
     urgent: bool = False,
 ) -> Program:
-    """`e2efly fly` as a process.
+    """`e2efly fly` as a process. Further options come last.
 
-    Args:
-        policy: a policy.onnx, or another text that the command accepts.
-        room: the room in which to fly.
-        log: log of the flight.
-        options: further options of the command. They come last.
-        link: address of the link to the firmware. None: the room's own.
-        pose: source of the poses. None: the room itself.
-        urgent: as for `Program`.
+    Without a link and a pose source, it connects to the room's own link and takes the room's poses.
     """
     command = ["-m", "e2efly", "fly", str(policy), "--link", link or room.link, "--log", str(log)]
     command += ["--pose", pose or f"udp:{room.pose_port}", "--flight.battery-unknown"]

@@ -56,13 +56,8 @@ class Rehearsal:
     """The task's error over the second half of the policy's flight, m, or NaN."""
     final_error: float
     """The task's error at the end of the policy's flight, m, or NaN."""
-    final_speed: float
-    """Largest true speed over the last `LAST_S` of the policy's flight, m/s. For a landing: the speed of the touch. Or
-    NaN."""
     top_speed: float
     """Largest speed of the policy, m/s."""
-    arrivals: tuple[float, ...]
-    """Times at which it reached a goal, such as a gate, s from its start."""
     told: str
     """How the policy did, as text."""
     flown: FlownSession
@@ -80,31 +75,20 @@ def rehearse(
     policy: Acting,
     vehicle: Vehicle,
     *,
-    course: Course | None = None,
     seed: int = 0,
     log: Log | None = None,
-    folder: Path | None = None,
     scenery: Scenery | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
 ) -> Rehearsal:
-    """Fly one whole flight.
+    """Fly one whole flight. The vehicle is that of the world and of the bridge.
 
-    Args:
-        firmware: the built firmware.
-        policy: as loaded.
-        vehicle: the vehicle of the world and of the bridge.
-        course: where it flies. If left out: where the training was.
-        seed: seed of the place where the vehicle stands and of the poses' noise.
-        log: keeps the flight's record.
-        folder: folder of the firmware's files. If left out: a temporary one.
-        scenery: the world that a policy sees. None: the policy sees nothing.
-        wrap: a wrapper around each camera, between the camera and the bridge.
+    `scenery` is the world that a policy sees. `wrap` puts a wrapper between each camera and the bridge.
     """
-    course = whole_course(policy, vehicle) if course is None else course
+    course = whole_course(policy, vehicle)
     course = course if scenery is None else scenery.on(course)
     with tempfile.TemporaryDirectory(prefix="e2efly-") as temporary:
         latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
-        with Rig(firmware, folder or Path(temporary), vehicle, latency=latency, seed=seed) as rig:
+        with Rig(firmware, Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
             flight = _fly(rig, policy, course, seed, log, [wrap(source) for source in sources])
     return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
@@ -182,9 +166,7 @@ def _report(
         success=ended is not None and _success(course, ended),
         mean_error=mean,
         final_error=final,
-        final_speed=speed,
         top_speed=max(speeds, default=0.0),
-        arrivals=arrivals,
         told=course.goal.told(arrivals, mean, final, speed) if judged else "none",
         flown=flown,
     )

@@ -115,10 +115,7 @@ class Drawn:
 def draw(plan: RehearsalPlan, seed: int, track: Path) -> Drawn:
     """The world of a seed, as `e2efly hil` draws it, and the course in it.
 
-    Args:
-        plan: the settings of the rehearsal.
-        seed: seed of the world.
-        track: path of a .toml file that is written if the task draws its gates.
+    Gates that the task draws are written to `track`, a .toml file.
 
     Raises:
         ValueError: for a policy without images, for a scene in which the course cannot begin, and for a task whose
@@ -149,11 +146,8 @@ def draw(plan: RehearsalPlan, seed: int, track: Path) -> Drawn:
 def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None = None) -> Lap:
     """Fly one flight, from take-off to landing, in separate processes.
 
-    Args:
-        plan: the settings of the rehearsal.
-        seed: seed of the world, of the poses' noise, of the place where the vehicle stands, and of the time of a kill.
-        folder: folder of the flight's record. It is made.
-        kill: the process that is killed while the policy flies.
+    One of them may be killed while the policy flies. The seed is that of the world, of the poses' noise, of the place
+    where the vehicle stands, and of the time of a kill.
 
     Returns:
         The results of the flight. If a program fails, its last words are in the problems.

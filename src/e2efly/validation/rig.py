@@ -29,6 +29,8 @@ LONGEST_LAG_S = 0.2
 """In real time: the longest delay of world and firmware on a busy machine that is made up for, s."""
 RC_PERIOD_S = 0.02
 """Interval between frames of the pilot's receiver, s."""
+POSE_PERIOD_S = 1 / 200.0
+"""Interval between the poses of the motion capture system, s."""
 CALIBRATION_S = 6.0
 """Time for which the firmware stands still before it can be armed, s."""
 POSE_NOISE = (0.0005, 0.01, 0.02, 0.001)
@@ -119,7 +121,6 @@ class Rig:
         vehicle: Vehicle,
         *,
         real_time: bool = False,
-        pose_rate: float = 200.0,
         latency: float = 0.0,
         seed: int = 0,
         step: float = STEP_S,
@@ -145,7 +146,7 @@ class Rig:
         """Function from the true state to the readings of the firmware's sensors. None: the sensors are exact."""
         self.heard = True
         """Whether the pilot's receiver receives the transmitter."""
-        self._pose_period, self._pose_noise = 1 / pose_rate, pose_noise
+        self._pose_noise = pose_noise
         self._poses: deque[Sample] = deque()
         self._next_pose = self._next_rc = 0.0
         self._left = 0.0
@@ -231,7 +232,7 @@ class Rig:
             self._next_rc += RC_PERIOD_S
             self._receive()
         if now >= self._next_pose:
-            self._next_pose += self._pose_period
+            self._next_pose += POSE_PERIOD_S
             self._poses.append(self._sample(now))
 
     def _moved(self, motors: np.ndarray, dt: float) -> FlownBody:

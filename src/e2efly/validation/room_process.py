@@ -111,13 +111,10 @@ def changes_of(line: bytes) -> dict[str, Any]:
 
 
 def serve(rig: Rig, poses: int, listener: socket.socket, record: Path | None = None) -> None:
-    """Run the rig until the control connection or standard input ends.
+    """Run a started rig in real time, until the control connection or standard input ends.
 
-    Args:
-        rig: a started rig, in real time.
-        poses: UDP port of the loopback interface.
-        listener: socket on which the control connection arrives.
-        record: CSV file that is written at the end, with the columns `RECORDED`. None: no file.
+    The poses go to a UDP port of the loopback interface. `record` is a CSV file that is written at the end, with the
+    columns `RECORDED`.
     """
     watch, sender = _Watch(rig), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

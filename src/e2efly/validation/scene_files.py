@@ -75,11 +75,8 @@ def load_world(
 ) -> World:
     """Load a scene by the path of its file, or one of the package's mesh scenes by name.
 
-    Args:
-        name: a .toml as in docs/vision.md, a mesh of one of `FORMATS`, or a name.
-        unit: length of a mesh file's unit, m. None: 1.
-        up: axis of a mesh file that points up. None: the axis that its format defines.
-        materials: whether a mesh file's colours, materials and textures are used.
+    A file is a .toml as in docs/vision.md, or a mesh of one of `FORMATS`. For a mesh, the other arguments are those of
+    `load_mesh_scene`.
 
     Raises:
         ValueError: naming the scene, what is wrong and what is accepted.
@@ -144,10 +141,7 @@ class Ground:
 def ground_of(scenery: Scenery, name: str, radius: float) -> Ground:
     """Look for the ground straight below the start of a course and below the way to its first goal.
 
-    Args:
-        scenery: the world and the course.
-        name: name of the world, for the error text.
-        radius: of the vehicle, m.
+    The name is for the error text, and the radius is that of the vehicle, m.
 
     Raises:
         ValueError: if there is no ground below the start, or if something is nearer to the start than the radius.

@@ -65,22 +65,14 @@ class Scenery:
         return dataclasses.replace(course, goal=self.course.goal, memory=self.course.memory)
 
     def sources(self, state: Callable[[], RigidState], origin: Origin) -> list["SceneCamera"]:
-        """The cameras of this scenery on a vehicle.
-
-        Args:
-            state: the vehicle's true state now, in the room.
-            origin: origin of the task's world in the room.
-        """
+        """The cameras of this scenery on a vehicle whose true state in the room is `state()`."""
         return [SceneCamera(self, i, state, origin) for i in range(len(self.cameras))]
 
     def image(self, which: int, state: RigidState, time: float, count: int) -> np.ndarray:
-        """A camera's image without latency. It is bit for bit that of `Env.look`.
+        """A camera's image without latency, from a state in this world at a time of the world, s.
 
-        Args:
-            which: number of the camera.
-            state: state of the vehicle, in this world.
-            time: time of the world, s.
-            count: number of images so far. Each image has other noise.
+        It is bit for bit that of `Env.look`. `count` is the number of images so far, because each image has other
+        noise.
         """
         return self.outlook.images(state, time, count, (which,))[0]
 
@@ -94,13 +86,8 @@ class Scenery:
         """Smallest distance of a path to the obstacles of this world, m.
 
         Solids to land on do not count. Infinite: there are no obstacles. In a world of triangles, a path that goes
-        through a triangle has the distance 0.
-
-        Args:
-            position: positions of the path, each (3,), in the room, m.
-            time: times of these positions, s.
-            origin: origin of the task's world in the room.
-            within: distance beyond which obstacles may be ignored, m.
+        through a triangle has the distance 0. Positions, each (3,), are in the room, m, and times in s. Obstacles
+        farther than `within`, m, may be ignored.
         """
         if self.near is not None:
             return self.near.distance(origin.seen(np.stack(position)), within) if len(position) else math.inf
@@ -123,14 +110,7 @@ class SceneCamera:
     """A camera in a rendered world as an image source. It exposes at its rate, and delivers images a latency later."""
 
     def __init__(self, scenery: Scenery, which: int, state: Callable[[], RigidState], origin: Origin) -> None:
-        """Mount the camera.
-
-        Args:
-            scenery: the world that it sees.
-            which: number of the scenery's camera.
-            state: the vehicle's true state now, in the room.
-            origin: origin of the scenery's world in the room.
-        """
+        """Mount one of the scenery's cameras on a vehicle whose true state in the room is `state()`."""
         self.problem: str | None = None
         self._scenery, self._which, self._state, self._origin = scenery, which, state, origin
         self._camera = scenery.cameras[which]

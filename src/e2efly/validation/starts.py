@@ -50,12 +50,9 @@ class Starts:
         return Starts(tuple(self.states[i] for i in rows), courses, memory, eyes)
 
     def sights(self, env: Env, seed: int, changed: CameraDraw | None = None) -> list[Sight | None]:
-        """The cameras and world of each start in an environment. None for a policy that sees nothing.
+        """The cameras and world of each start in its environment. None for a policy that sees nothing.
 
-        Args:
-            env: the environment from which they were drawn.
-            seed: seed of the images' noise.
-            changed: the cameras that a row of the stress test draws. None: the cameras that the starts have drawn.
+        A row of the stress test replaces the cameras that the starts have drawn.
         """
         if not env.cameras:
             return [None] * len(self)
@@ -97,10 +94,7 @@ def _scene(task: Task, memory: Any) -> Scene:
 def course_of(task: Task, memory: Any, start: np.ndarray) -> Course:
     """The course of one episode of a task, for the runtime: its goal in NumPy, without the part that trains.
 
-    Args:
-        task: the task of the environment.
-        memory: its state at the start of that episode, NumPy leaves (1, ...).
-        start: (3,) position at the start, m.
+    `memory` is the task's state at the start of that episode, NumPy leaves (1, ...).
     """
     options = getattr(task, "config", None)
     lean: Any = goal_of(type(options)) if isinstance(options, TaskConfig) else type(task)

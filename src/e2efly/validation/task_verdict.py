@@ -40,15 +40,10 @@ class Verdicts:
 
 
 def judge(env: Env, starts: Starts, flights: list[Trajectory], settle: float = 0.0) -> Verdicts:
-    """Let the task judge flights step by step, as it judges its own episodes.
+    """Let the task judge flights, one per start, step by step, as it judges its own episodes.
 
-    A flight that stopped before its episode was over (a fault) has not succeeded.
-
-    Args:
-        env: the environment, with the task, its period and the action before the first step.
-        starts: the starts of the flights, in the same order.
-        flights: one flight per start.
-        settle: seconds before the mean error counts.
+    A flight that stopped before its episode was over (a fault) has not succeeded. The mean error counts after `settle`
+    s.
 
     Raises:
         ValueError: when there is not one flight per start, or when a flight has another control period.

@@ -72,11 +72,7 @@ class Node:
         self._struck(np.zeros(3), np.zeros(3), 0.0)
 
     def step(self, now: float, clock: Callable[[], float]) -> str | None:
-        """Read poses, and publish images if they are due.
-
-        Args:
-            now: this machine's monotonic clock, s.
-            clock: the same clock, to be read again after an image is published.
+        """Read poses, and publish images if they are due. The clock is read again after an image is published.
 
         Returns:
             What happened, as text. None: nothing new.

@@ -18,8 +18,8 @@ from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import powered
 from e2efly.simulation.physics.integrate import rk4
 from e2efly.simulation.physics.state import Parts
+from e2efly.validation.plant_flight import imu_of
 from e2efly.validation.sitl import FirmwareState
-from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.001
@@ -66,14 +66,10 @@ class World:
         wind: np.ndarray | None = None,
         rotor_share: np.ndarray | None = None,
     ) -> FlownBody:
-        """The state after `dt` s under constant motor outputs.
+        """The state after `dt` s, a whole number of `STEP_S`, under constant motor outputs.
 
-        Args:
-            state: the state before.
-            motors: (4,) in [0, 1], Betaflight's order; rotor speed is proportional to it.
-            dt: duration, s, a whole number of `STEP_S`.
-            wind: (3,) world, m/s.
-            rotor_share: (4,) thrust of each rotor divided by the thrust from the vehicle's thrust map.
+        The outputs, (4,) in [0, 1] in Betaflight's order, are proportional to the rotor speeds. The wind is in the
+        world, m/s. `rotor_share` is the thrust of each rotor divided by the thrust from the vehicle's thrust map.
         """
         standing = state.position[2] <= self.vehicle.feet_height and not (state.velocity.any() or state.body_rate.any())
         if standing and not (motors.any() or state.rotor_speed.any()):
@@ -108,11 +104,8 @@ class World:
 
     def sensed(self, before: FlownBody, after: FlownBody, dt: float) -> FirmwareState:
         """The readings of gyroscope and accelerometer after a step of `dt` s."""
-        felt = (after.velocity - before.velocity) / dt + np.array([0, 0, GRAVITY])
-        attitude = Quat(*after.quaternion)
-        force = attitude.unrotate(Vec3(*felt))
-        return FirmwareState(after.body_rate, np.array([force.x, force.y, force.z]), after.quaternion, after.velocity,
-                             after.position)  # fmt: skip
+        felt = imu_of(before, after, dt)
+        return FirmwareState(felt.gyroscope, felt.accelerometer, after.quaternion, after.velocity, after.position)
 
 
 def _stand(vehicle: Vehicle, free: Parts) -> Parts:

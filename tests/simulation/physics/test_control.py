@@ -99,7 +99,7 @@ def test_cascade_keeps_its_limits(answer: Callable[..., State], vacuum: Vehicle)
     assert np.all(np.abs(path.velocity) < vacuum.speed_max + 0.1)
     np.testing.assert_allclose(path.velocity[-1], [[5, 0, 0], [0, -5, -2]], atol=1e-3)
     path = answer("acceleration", (100.0, 0.0, 0.0, 0.0), (100.0, 100.0, -100.0, 0.0))
-    tilt = np.arccos(np.asarray(rotation.cos_tilt(path.quaternion)))
+    tilt = np.arccos(np.asarray(rotation.to_matrix(path.quaternion)[..., 2, 2]))
     assert tilt.max() < vacuum.tilt_max + 0.15
     assert tilt[-1, 1] == pytest.approx(vacuum.tilt_max, abs=1e-3)  # 100 m/s^2 sideways of 0.1 g up
     np.testing.assert_allclose(path.velocity[-1, 0] - path.velocity[-31, 0], [8, 0, 0], atol=1e-3)
@@ -115,7 +115,7 @@ def test_recovers_from_any_attitude(mode: str, fly: Callable[..., State], vis_r:
     path = fly(Physics.of(vis_r, mode, dtype=np.float64), vis_r, state, jnp.broadcast_to(hover, (90, TURNS, 4)))
     assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(path))
     np.testing.assert_allclose(level(path)[-1, :, 0], 0, atol=0.05)
-    assert np.min(rotation.cos_tilt(path.quaternion[-1])) > 0.9
+    assert np.min(rotation.to_matrix(path.quaternion[-1])[..., 2, 2]) > 0.9
 
 
 @pytest.mark.parametrize("mode", ["attitude", "position"])

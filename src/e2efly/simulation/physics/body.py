@@ -122,11 +122,8 @@ def accelerations(
 ) -> tuple[Vec3, Vec3]:
     """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
 
-    Args:
-        plant: the vehicle that flies.
-        parts: its state, with the rotor speeds that produce the thrust.
-        wind: velocity of the air in the world, m/s.
-        rotor_acceleration: rad/s^2; required if the plant has rotor inertia.
+    The wind is the velocity of the air in the world, m/s. Accelerations of the rotors, rad/s^2, are required if the
+    plant has rotor inertia.
     """
     collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
     if plant.rotor_inertia is not None and rotor_acceleration is not None:

@@ -20,13 +20,10 @@ Integrator = Callable[[Airframe, Parts, Rotors, Vec3 | None, float], Parts]
 def lagged(
     speed: Rotors, command: Rotors, decay: Array | np.ndarray, decay_down: Array | np.ndarray | None = None
 ) -> Rotors:
-    """Rotor speeds after some time of first-order lag towards a constant command: the exact solution.
+    """Rotor speeds after some time of first-order lag towards a constant command: the exact solution, rad/s.
 
-    Args:
-        speed: rotor speeds at the start, rad/s.
-        command: speeds that the rotors approach, rad/s.
-        decay: fraction of the difference to the command that remains after that time.
-        decay_down: the same fraction for a rotor that slows down. None: the same as for a rotor that speeds up.
+    `decay` is the fraction of the difference to the command that remains after that time. For a rotor that slows down,
+    it is `decay_down`, unless that is None.
     """
     if decay_down is None:
         a, b, c, d = (u + (w - u) * decay for w, u in zip(speed, command, strict=True))

@@ -50,11 +50,6 @@ def yaw(q: Quaternion) -> Float[Array, "*n"]:
     return Quat.of(q).yaw()
 
 
-def cos_tilt(q: Quaternion) -> Float[Array, "*n"]:
-    """Cosine of the angle between the body's z axis and up."""
-    return Quat.of(q).z_axis().z
-
-
 def yaw_pitch_roll(q: Quaternion) -> Vector:
     """[yaw, pitch, roll] in rad, for people to read (not differentiable at pitch of +-90 deg)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]

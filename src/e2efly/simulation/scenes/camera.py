@@ -72,11 +72,8 @@ def mounted(
 ) -> Mount:
     """The cameras of n vehicles, each mounted individually.
 
-    Args:
-        config: the configuration of all cameras.
-        angles: roll, pitch and yaw in addition to the configuration's pitch, rad.
-        factor: factor on a pinhole's field of view, for each axis or for both (k is 2 or 1).
-        offset: offset from the configuration's position, body frame, m.
+    Angles are roll, pitch and yaw, rad, in addition to the configuration's pitch. Offsets from its position are in the
+    body frame, m. A factor acts on a pinhole's field of view, for each axis or for both (k is 2 or 1).
     """
     turned = to_matrix(from_euler(angles[:, 0], angles[:, 1] + config.pitch, angles[:, 2])) @ _AHEAD
     if config.projection == "pinhole":

@@ -22,12 +22,7 @@ def _between(key: PRNGKeyArray, shape: tuple[int, ...], bounds: tuple[float, flo
 def forest(key: PRNGKeyArray, n: int, config: ForestConfig, start: Array, goal: Array) -> Solids:
     """Upright trunks, uniformly distributed over a lane that begins at the start and follows x.
 
-    Args:
-        key: key for the worlds.
-        n: number of worlds.
-        config: the forest.
-        start: (n, 3) point that is kept clear, world, m.
-        goal: (n, 3) point that is kept clear, world, m.
+    Start and goal (world, m) are kept clear.
 
     Returns:
         Cylinders. Their mean number follows from `config.density`. A trunk that would stand in a clear place is left
@@ -60,14 +55,8 @@ def clutter(
 ) -> dict[str, Solids]:
     """Obstacles of all kinds around a polyline, clear of some points.
 
-    Args:
-        key: key for the worlds.
-        n: number of worlds.
-        config: the clutter.
-        path: corners of the polyline, world, m.
-        keep: points that are kept clear, world, m.
-        radius: radius of the clear space around each of these points, in addition to `config.clear`, m.
-        legs: number of straight segments of each world's polyline. None: all.
+    The corners of the polyline are in the world, m. Each world has `legs` of its straight segments (None: all). The
+    space around each point of `keep`, world, m, is clear within `radius` in addition to `config.clear`, m.
 
     Returns:
         Solids by kind, with their centres above the ground.

@@ -16,14 +16,9 @@ GROUND = 500.0
 
 
 def parts(scene: Scene, world: int, segments: int = 64) -> list[MeshPart]:
-    """One world as the parts of a `MeshScene`.
+    """One world as the parts of a `MeshScene`. Round solids are inscribed with `segments` segments around.
 
     The ground comes first, then the solids in the order of their instance numbers.
-
-    Args:
-        scene: the worlds.
-        world: index of the world.
-        segments: number of segments around round solids, which are inscribed.
     """
     found = []
     ground = float(scene.ground[world])

@@ -152,12 +152,6 @@ def join(*solids: Solids) -> Solids:
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *solids)
 
 
-def first_instance(scene: Scene, kind: str) -> int:
-    """Instance number of the first solid of a kind. The sky is 0, the ground is 1, then kind follows kind."""
-    before = scene.kinds[: scene.kinds.index(kind)]
-    return 2 + sum(scene.solids[name].count for name in before)
-
-
 def clearance(scene: Scene, position: Float[Array, "n 3"], time: Float[Array, " n"]) -> Float[Array, " n"]:
     """Signed distance of a point in each world to the nearest object, m, negative inside. Differentiable."""
     return jnp.min(gaps(scene, position, time), axis=1)

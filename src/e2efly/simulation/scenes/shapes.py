@@ -94,7 +94,6 @@ def _facing(*faces: tuple[Array, Components]) -> Components:
 
 
 def _along(axis: int, value: Array) -> Components:
-    """A vector along an axis."""
     return tuple(value if i == axis else jnp.zeros_like(value) for i in range(3))  # pyright: ignore
 
 

@@ -23,12 +23,9 @@ class Pattern:
 
     @staticmethod
     def of(directions: np.ndarray, flat: bool, tile: tuple[int, int] | None = None) -> "Pattern":
-        """Cut (height, width, 3) directions into tiles.
+        """Cut (height, width, 3) directions into tiles. Without `tile`, they have at most 16 rows and columns.
 
-        Args:
-            directions: directions of the rays.
-            flat: whether the directions end in a plane, so that a tile lies in the cone of its corners.
-            tile: rows and columns of a tile. If left out: at most 16 of each.
+        `flat` directions end in a plane, so that a tile lies in the cone of its corners.
         """
         height, width, _ = directions.shape
         th, tw = tile or (_divisor(height, 16), _divisor(width, 16))

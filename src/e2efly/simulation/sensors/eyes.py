@@ -96,13 +96,7 @@ def image_shape(config: CameraConfig) -> tuple[int, ...]:
 def see(config: CameraConfig, eye: Eye, scene: Scene | MeshScene, state: State, key: PRNGKeyArray) -> Array:
     """The images of n vehicles.
 
-    Args:
-        config: the camera.
-        eye: how it is mounted on each vehicle.
-        scene: n worlds, standing still, or the one world of triangles in which all vehicles are. Its colours are those
-            of its file.
-        state: state of the vehicles.
-        key: key of the noise.
+    The worlds stand still, or all vehicles are in the one world of triangles, whose colours are those of its file.
 
     Returns:
         Depth and range in m (0: a hole) or a mask of 0 and 1, of shape (n, h, w). Colours in [0, 1] and normals, (n, h,

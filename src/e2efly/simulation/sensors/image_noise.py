@@ -161,14 +161,8 @@ def d435i(key: PRNGKeyArray, depth: Depth, fov: float, least: float = 0.28, most
     """Intel D435i: noise of the disparity, the shadows of its second imager, and its range.
 
     The deviation of the depth is z^2 d / (f B): 4 mm at 1 m, 10 cm at 5 m. A pixel is a hole if something nearer hides
-    it from the left imager (B to the side), and if it is nearer than `least` or farther than `most`.
-
-    Args:
-        key: of the noise.
-        depth: planar, m, (n, h, w).
-        fov: horizontal field of view, rad.
-        least: smallest depth that it measures, m.
-        most: largest depth that it measures, m.
+    it from the left imager (B to the side), and if it is nearer than `least` or farther than `most`, m. `fov` is the
+    horizontal field of view, rad.
     """
     width = depth.shape[-1]
     native = NATIVE_WIDTH / 2 / math.tan(fov / 2)
@@ -225,12 +219,7 @@ def redwood(key: PRNGKeyArray, depth: Depth, table: Float[Array | np.ndarray, "8
     """Depth as PrimeSense-like cameras measure it (Choi, Zhou, Koltun 2015; distortion after Teichman et al. 2013).
 
     Pixels are jittered by a quarter of a pixel times depth, and read at every second one. Depth of 10 m and more is a
-    hole. Depth is divided by the distortion. After noise, the disparity is rounded to eighths.
-
-    Args:
-        key: of the noise.
-        depth: planar, m, (n, h, w).
-        table: distortion factors, see `synthetic_distortion`.
+    hole. Depth is divided by the distortion (`synthetic_distortion`). After noise, the disparity is rounded to eighths.
     """
     n, height, width = depth.shape
     jitter_key, noise_key = jax.random.split(key)

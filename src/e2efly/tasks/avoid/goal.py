@@ -48,7 +48,6 @@ class AvoidGoal(Goal):
 
     def goal(self, memory: AvoidMemory, time: Array) -> Array:
         """A point behind the end of the forest."""
-        del time
         c, zero = self.config, 0.0 * memory.speed
         return namespace(zero).stack([zero + c.forest.length + BEYOND, zero, zero + c.altitude], axis=-1)
 
@@ -60,7 +59,6 @@ class AvoidGoal(Goal):
 
     def height(self, memory: AvoidMemory, time: Array, body: Any) -> Array:
         """Height of the centre of mass above the ground."""
-        del memory, time
         return body.position[:, 2:]
 
     observation = (
@@ -73,7 +71,6 @@ class AvoidGoal(Goal):
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """The verdict without knowledge of the obstacles."""
-        del timed_out
         return self.verdict(memory, before, after, time, False)
 
     def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
@@ -81,7 +78,6 @@ class AvoidGoal(Goal):
 
         `hit`: a tree was touched.
         """
-        del before, time
         c, position = self.config, after.position
         x, y, z = position[:, 0], position[:, 1], position[:, 2]
         left = (abs(y) > c.forest.width / 2) | (z > c.ceiling) | (z < self.shape.feet_height) | (x < -5.0)
@@ -93,7 +89,6 @@ class AvoidGoal(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The time at the end of the forest, or the distance flown, as text."""
-        del mean_error, speed
         length = float(self.config.forest.length)
         if arrivals:
             return f"{length:g} m in {arrivals[-1]:.2f} s"
@@ -112,7 +107,6 @@ class AvoidRoute(Route):
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "AvoidRoute":
         """The route with the speed that was drawn."""
-        del file
         return cls(speed=float(course.memory.speed[0]))
 
     def domain(self) -> Domain:

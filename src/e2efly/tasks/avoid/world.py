@@ -75,7 +75,6 @@ class Avoid(AvoidGoal):
         self, memory: AvoidWorld, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[AvoidWorld, Outcome]:
         """The goal's verdict, with signals for the reward."""
-        del timed_out
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
         moved, outcome = self.verdict(memory, before, after, time, hit)
         wanted, _ = self.expert(memory, after.position, after.velocity)

@@ -6,6 +6,7 @@ short side.
 
 import dataclasses
 import functools
+import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from e2efly.control.vectors import Array, Quat, namespace
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.gap import GapConfig
-from e2efly.tasks.route import Route, place, turned
+from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate
 
 WALL_WIDTH = 3.0
@@ -65,18 +66,15 @@ class GapGoal(Goal):
 
     def goal(self, memory: GapMemory, time: Array) -> Array:
         """The middle of the slit; once it is passed, the point behind it."""
-        del time
         both = self.targets(memory)
         return namespace(both).where(memory.passed[:, None], both[:, 1], both[:, 0])
 
     def target_offsets(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both targets minus position."""
-        del time
         return offsets(self.targets(memory), body)
 
     def flat_axes(self, memory: GapMemory, time: Array, body: Any) -> Array:
         """Both axes as one vector."""
-        del time
         return self.axes(memory).reshape(body.position.shape[0], 6)
 
     observation = (
@@ -123,7 +121,6 @@ class GapGoal(Goal):
         The slit is passed in a step whose straight line crosses the wall's middle plane forward inside the opening.
         Crossing this plane forward anywhere else fails, also beside the wall.
         """
-        del timed_out
         c, xp = self.config, namespace(after.position)
         a, b = (unrotate(memory.quaternion, body.position - memory.centre) for body in (before, after))
         share = a[:, 0] / xp.where(a[:, 0] == b[:, 0], 1.0, a[:, 0] - b[:, 0])
@@ -149,7 +146,6 @@ class GapGoal(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The time of passing the slit, as text."""
-        del mean_error, final_error
         return f"through after {arrivals[0]:.2f} s, then {speed:.1f} m/s" if arrivals else "not through"
 
     def failure(self, memory: GapMemory, outcome: Outcome) -> str:
@@ -192,6 +188,7 @@ class GapRoute(Route):
         goal = GapGoal(GapConfig(), shape, control_period, checks=4)
         turn = Quat.of_euler(np.array([self.slit_roll]), np.zeros(1), np.array([self.slit_yaw])).stack()
         memory = GapMemory(np.array([self.slit]), turn, np.zeros(1, bool))
-        start = np.asarray(self.slit) - self.before * turned(self.slit_yaw)
+        ahead = np.array([math.cos(self.slit_yaw), math.sin(self.slit_yaw), 0.0])
+        start = np.asarray(self.slit) - self.before * ahead
         lowest = self.slit[2] - goal.config.opening[0] / 2
         return Course(goal, memory, start, heading=self.slit_yaw, lowest=lowest, clearance=0.0)

@@ -69,7 +69,6 @@ class Gap(GapGoal):
 
     def desired_yaw(self, memory: GapMemory, state: State) -> Float[Array, " n"]:
         """The heading straight through the wall."""
-        del state
         through = self.axes(memory)[:, 0]
         return jnp.arctan2(through[:, 1], through[:, 0])
 

@@ -14,7 +14,7 @@ from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.hover import HoverConfig
-from e2efly.tasks.route import Route, beside, place
+from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground
 
 
@@ -52,7 +52,6 @@ class HoverGoal(Goal):
 
         Leaving the fence, touching the ground or tumbling fails.
         """
-        del before
         c = self.config
         error = distance(after.position, self.goal(memory, time))
         held = held_longer(memory, error < c.radius, self.control_period)
@@ -76,5 +75,5 @@ class HoverRoute(Route):
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the target. It has no end."""
         goal = HoverGoal(dataclasses.replace(HoverConfig(), target=self.target), shape, control_period)
-        start = beside(self.target, (1.0, -0.5, -1.0))
+        start = np.add(self.target, (1.0, -0.5, -1.0))
         return Course(goal, np.zeros(1), start, duration=math.inf, lowest=self.target[2])

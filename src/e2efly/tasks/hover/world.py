@@ -34,5 +34,4 @@ class Hover(HoverGoal):
 
     def desired_yaw(self, memory: Float[Array, " n"], state: State) -> Float[Array, " n"]:
         """Along world x."""
-        del state
         return jnp.zeros_like(memory)

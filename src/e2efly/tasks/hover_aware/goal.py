@@ -16,7 +16,7 @@ from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.hover_aware import HoverAwareConfig
-from e2efly.tasks.route import Route, beside, place
+from e2efly.tasks.route import Route, place
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground, unrotate
 
 OUTSIDE = 10.0
@@ -57,7 +57,6 @@ class HoverAwareGoal(Goal):
 
     def goal(self, memory: HoverAwareMemory, time: Array) -> Array:
         """The point to hover at."""
-        del time
         xp = namespace(memory.held)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.held.shape, 3))
 
@@ -109,7 +108,6 @@ class HoverAwareGoal(Goal):
 
         Leaving the fence, or touching the ground or the object, fails.
         """
-        del before
         c, ball = self.config, self.look_at(memory, time)
         error = distance(after.position, self.goal(memory, time))
         pixel = self.pixel(after.position, after.quaternion, ball)
@@ -152,5 +150,5 @@ class HoverAwareRoute(Route):
             centre=np.array([[*self.target[:2], self.target[2] + z]]), away=np.array([math.hypot(x, y)]),
             angle=np.array([math.atan2(y, x)]), rate=np.array([self.turn_rate]), time=np.zeros(1), held=np.zeros(1),
         )  # fmt: skip
-        start = beside(self.target, (0.5, -0.5, -0.5))
+        start = np.add(self.target, (0.5, -0.5, -0.5))
         return Course(HoverAwareGoal(config, shape, control_period), memory, start, lowest=self.target[2])

@@ -1,6 +1,6 @@
 """Options and recipes: touch down gently on a point of the ground."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +21,11 @@ from e2efly.config.drawing import INK, ORANGE, Face, Line, Thing, circle
 from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
+
+PPO_WEIGHTS = {
+    "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0, "crash": 10.0,
+}  # fmt: skip
+"""Weights of the reward with which PPO learns to land."""
 
 
 @register("land")
@@ -44,12 +49,7 @@ class LandConfig(TaskConfig):
         )
     }
     family: ClassVar = {
-        "bptt": Robust(
-            weights={"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.05, "act2_sq": 0.05},
-            algo={"horizon": 96, "average": 0.99},
-            steps=6_000_000,
-            chunk=60,
-        )
+        "bptt": replace(robust["bptt"], algo={"horizon": 96, "average": 0.99}, steps=6_000_000, chunk=60)
     }
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
@@ -93,11 +93,7 @@ class LandConfig(TaskConfig):
     def recipe(cls, algo: str) -> TrainConfig:
         """Rewards for coming nearer, descending and staying upright."""
         if algo == "ppo":
-            weights = {
-                "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02,
-                "goal": 10.0, "crash": 10.0,
-            }  # fmt: skip
             settings: AlgorithmConfig = PPOConfig(learning_rate=5e-3, learning_rate_end=5e-4)
-            return TrainConfig(cls(), settings, RewardConfig(weights), steps=2_000_000)
+            return TrainConfig(cls(), settings, RewardConfig(dict(PPO_WEIGHTS)), steps=2_000_000)
         weights = {"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02}
         return TrainConfig(cls(), BPTTConfig(learning_rate=8e-3), RewardConfig(weights), steps=1_000_000, chunk=10)

@@ -33,7 +33,6 @@ class Landing(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The place and speed of the touch, as text."""
-        del arrivals, mean_error
         return f"touched {100 * final_error:.1f} cm off at {speed:.2f} m/s"
 
 
@@ -46,7 +45,6 @@ class LandGoal(Landing):
 
     def goal(self, memory: Array, time: Array) -> Array:
         """The position of the centre of mass when the vehicle stands on the pad."""
-        del memory
         zero = 0.0 * time
         return namespace(time).stack([zero, zero, zero + self.shape.feet_height], axis=-1)
 
@@ -76,18 +74,13 @@ class LandGoal(Landing):
 
         The episode ends at the first touch. It is judged at the end of the step.
         """
-        del before, timed_out
         return memory, touchdown(self.config, after, self.goal(memory, time), touches_ground(self.shape, after))
 
 
 def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
-    """The verdict on a landing.
+    """The verdict on a landing, by `radius`, `height_error`, `speed` and `tilt` of the options, and their `fence`.
 
-    Args:
-        config: options with `radius`, `height_error`, `speed` and `tilt` at the touch, and the `fence`.
-        body: the vehicles at the end of the step.
-        goal: (n, 3) their position after landing.
-        touched: (n,) whether they touch the pad or the ground.
+    `goal` is the position of the vehicles after landing. `touched` marks those that touch the pad or the ground.
     """
     xp = namespace(body.position)
     offset = body.position - goal
@@ -117,7 +110,6 @@ class LandRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        del control_period
         start = np.array([1.0, 0.5, 2.0])
         goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)
         return Course(goal, np.zeros((1, 0)), start, lowest=math.inf, origin=pad)

@@ -39,5 +39,4 @@ class Land(LandGoal):
 
     def desired_yaw(self, memory: Float[Array, "n 0"], state: State) -> Float[Array, " n"]:
         """Along world x."""
-        del memory
         return jnp.zeros_like(state.position[:, 0])

@@ -21,6 +21,7 @@ from e2efly.config import (
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.courses import defaults
+from e2efly.tasks.land import PPO_WEIGHTS
 from e2efly.tasks.registry import register
 
 
@@ -75,11 +76,7 @@ class LandVisualConfig(TaskConfig):
         settings: AlgorithmConfig = BPTTConfig(envs=32, horizon=48, learning_rate_end=1.2e-4)
         steps = 650_000
         if algo == "ppo":
-            weights = {
-                "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0,
-                "crash": 10.0,
-            }  # fmt: skip
-            settings, steps = PPOConfig(learning_rate=2e-3), 2_000_000
+            weights, settings, steps = dict(PPO_WEIGHTS), PPOConfig(learning_rate=2e-3), 2_000_000
         network, seen = NetworkConfig((128, 64)), EnvConfig(cameras=cls.cameras)
         return TrainConfig(
             cls(), settings, RewardConfig(weights), seen, network, steps=steps, chunk=30, eval_episodes=100

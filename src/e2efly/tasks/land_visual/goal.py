@@ -23,25 +23,21 @@ class LandVisualGoal(Landing):
     @classmethod
     def state(cls, memory: Any) -> Array:
         """Nothing: the pad is known only from camera images."""
-        del memory
         return np.zeros((1, 0))
 
     def goal(self, memory: Any, time: Array) -> Array:
         """The position of the centre of mass when the vehicle stands on the pad."""
-        del memory
         zero = 0.0 * time
         return namespace(time).stack([zero, zero, zero + self.config.pad_height + self.shape.feet_height], axis=-1)
 
     def height(self, memory: Any, time: Array, body: Any) -> Array:
         """Height of the feet above the ground."""
-        del memory, time
         return body.position[:, 2:] - self.shape.feet_height
 
     observation = ((Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"), height),)
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """The verdict without knowledge of the pad's outline. The pad counts as a disc of the largest width."""
-        del before, timed_out
         feet = after.position[:, 2] - self.shape.feet_height
         over = (after.position[:, :2] ** 2).sum(-1) < (self.config.pad_size[1] / 2) ** 2
         return memory, self.verdict(memory, after, time, (feet <= 0) | (over & (feet <= self.config.pad_height)))
@@ -60,6 +56,5 @@ class LandVisualRoute(LandRoute):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        del control_period
         start = np.array([0.5, 0.3, 2.0])
         return Course(LandVisualGoal(LandVisualConfig(), shape), np.zeros((1, 0)), start, origin=Origin(self.pad))

@@ -48,14 +48,12 @@ class LandVisual(LandVisualGoal):
 
     def desired_yaw(self, memory: Solids, state: State) -> Float[Array, " n"]:
         """Along world x."""
-        del memory
         return jnp.zeros_like(state.position[:, 0])
 
     def advance(
         self, memory: Solids, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Solids, Outcome]:
         """The goal's verdict. The pad's outline decides whether the vehicle touches the pad."""
-        del before, timed_out
         feet = after.position - jnp.array([0.0, 0.0, 1.0]) * self.shape.feet_height
         touched = (feet[:, 2] <= 0) | (distances("pad", memory, feet, time)[:, 0] <= 0)
         return memory, self.verdict(memory, after, time, touched)

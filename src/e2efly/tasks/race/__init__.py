@@ -139,7 +139,6 @@ class RaceConfig(TaskConfig):
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
         """`any_track`: a different track in every episode. From behind a gate, the way leads around it."""
-        del preset
         weights = {"progway" if name == "prog1" else name: weight for name, weight in config.reward.weights.items()}
         weights = {name: weight for name, weight in weights.items() if name != "near"} | {"fitlog": 1.0}
         algo: Any = config.algo

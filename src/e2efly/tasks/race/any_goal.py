@@ -75,27 +75,22 @@ class AnyRaceGoal(Racing):
 
     def goal(self, memory: AnyRaceMemory, time: Array) -> Array:
         """The next gate's centre."""
-        del time
         return Ahead.of(memory).centre[:, 0]
 
     def target_offsets(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The centres of the next gates minus position."""
-        del time
         return offsets(Ahead.of(memory).centre, body)
 
     def axes(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The directions of the next gates."""
-        del time
         return Ahead.of(memory).axis.reshape(body.position.shape[0], -1)
 
     def openings(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """Width and height of the next gates."""
-        del time
         return 2 * Ahead.of(memory).half.reshape(body.position.shape[0], -1)
 
     def height(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """Height above the ground, limited to `HIGHEST`."""
-        del memory, time
         return namespace(body.position).clip(body.position[:, 2:], 0.0, HIGHEST)
 
     observation = (
@@ -135,7 +130,6 @@ class AnyRaceGoal(Racing):
 
         Crossings are judged on the straight line of the step.
         """
-        del time, timed_out
         tracks, xp = memory.tracks, namespace(memory.passed)
         laps = xp.where(tracks.closed, self.config.laps, 1)
         end = (laps > 0) & (memory.passed + 1 >= laps * tracks.count)
@@ -153,5 +147,4 @@ class AnyRaceGoal(Racing):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The number of gates passed and the time of the last one, as text."""
-        del mean_error, final_error, speed
         return f"{len(arrivals)} gates" + (f" in {arrivals[-1]:.2f} s" if arrivals else "")

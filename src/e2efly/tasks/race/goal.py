@@ -54,12 +54,10 @@ class RaceGoal(Racing):
 
     def goal(self, memory: Array, time: Array) -> Array:
         """The next gate's centre."""
-        del time
         return namespace(memory).asarray(self.gates.position)[memory % self.count]
 
     def targets(self, memory: Array, time: Array) -> Array:
         """(n, 2, 3) the centres of the next two gates, world, m."""
-        del time
         xp, index = namespace(memory), memory % self.count
         return xp.asarray(self.gates.position)[xp.stack([index, index + 1], axis=-1)]
 
@@ -83,7 +81,6 @@ class RaceGoal(Racing):
 
         Crossings are judged on the straight line of the step.
         """
-        del time, timed_out
         laps = self.config.laps if self.closed else 1
         end = (laps > 0) & (memory + 1 >= laps * self.count)
         passed, outcome = self.verdict(memory, before, after, self.gates, memory % self.count, end, self.config.fence)
@@ -91,7 +88,6 @@ class RaceGoal(Racing):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The number of laps and the mean lap time, as text."""
-        del mean_error, final_error, speed
         laps = len(arrivals) // self.count
         each = f", {arrivals[laps * self.count - 1] / laps:.2f} s each" if laps else ""
         return f"{len(arrivals) / self.count:g} laps{each}"
@@ -112,7 +108,6 @@ class RaceRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the track, from its start and with its heading."""
-        del control_period
         track = self._track()
         gates = Gates.of(track)
         return self._placed(RaceGoal(self._options(), shape, gates, track.closed), np.zeros(1, int), track)

@@ -24,14 +24,8 @@ class Racing(Goal):
     ) -> tuple[Array, Outcome]:
         """The outcome of a step, and which vehicles have passed a gate in it.
 
-        Args:
-            memory: the task's state before the step.
-            before: the vehicles at the start of the step.
-            after: the vehicles at its end.
-            gates: the gates of the track, or of each world's track.
-            index: (n,) the next gate, counted from 0 within a lap.
-            end: (n,) whether a vehicle that passes this gate has finished.
-            fence: largest allowed distance from this gate, m.
+        `index` is the next gate, counted from 0 within a lap. `end` marks the vehicles that have finished if they pass
+        it. `fence` is the largest allowed distance from it, m.
         """
         passed, missed, struck = gates.judge(index, before.position, after.position, self.shape.radius)
         error = distance(after.position, self.goal(memory, index))

@@ -32,7 +32,6 @@ class Race(RaceGoal):
         Raises:
             ValueError: for an unknown or broken track.
         """
-        del control_period, checks
         if config.any_track:
             return AnyRace.of(config, shape)
         track = load_track(config.track)

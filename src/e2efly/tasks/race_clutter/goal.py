@@ -50,22 +50,18 @@ class RaceClutterGoal(Goal):
 
     def goal(self, memory: ClutterMemory, time: Array) -> Array:
         """The next gate's centre."""
-        del time
         return Ahead.of(memory).centre[:, 0]
 
     def target_offsets(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The centres of the next two gates minus position."""
-        del time
         return offsets(Ahead.of(memory).centre[:, :2], body)
 
     def flat_axes(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The directions of flight through the next two gates."""
-        del time
         return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
     def desired_speed(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
         """The commanded speed."""
-        del time, body
         return memory.speed[:, None]
 
     observation = (
@@ -79,7 +75,6 @@ class RaceClutterGoal(Goal):
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """The verdict without knowledge of the obstacles."""
-        del timed_out
         return self.verdict(memory, before, after, time, False)
 
     def verdict(self, memory: Any, before: Any, after: Any, time: Array, hit: Array | bool) -> tuple[Any, Outcome]:
@@ -105,7 +100,6 @@ class RaceClutterGoal(Goal):
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The number of gates passed and the time of the last one, as text."""
-        del mean_error, final_error, speed
         return f"{len(arrivals)} gates in {arrivals[-1]:.2f} s" if arrivals else "no gate"
 
     def failure(self, memory: ClutterMemory, outcome: Outcome) -> str:

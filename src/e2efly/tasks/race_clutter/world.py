@@ -160,7 +160,6 @@ class RaceClutter(RaceClutterGoal):
         self, memory: ClutterWorld, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[ClutterWorld, Outcome]:
         """The goal's verdict, with signals for the reward."""
-        del timed_out
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
         moved, outcome = self.verdict(memory, before, after, time, hit)
         signals = {

@@ -97,7 +97,6 @@ class TrackGoal(Goal):
 
         Leaving the fence or touching the ground fails.
         """
-        del before
         c = self.config
         error = distance(after.position, self.goal(memory, time))
         counts = (time > c.settle_s).astype(error.dtype)
@@ -142,7 +141,6 @@ class TrackRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the reference, from its first point to its end."""
-        del control_period
         spline = self._spline()
         start = np.array(spline.position(np.zeros((1, 1)))[0, 0], np.float64)
         memory = TrackMemory(spline, np.zeros(1), np.zeros(1))

@@ -39,7 +39,6 @@ class Track(TrackGoal):
         Raises:
             ValueError: for an unknown kind or a broken file.
         """
-        del control_period, checks
         numbers = dataclasses.replace(config, reference="")  # resolved here: references share a compiled program
         kinds = ("polynomial", "circle", "lemniscate")
         m = knot_count(config.episode_s + POINTS * SPACING)
@@ -96,5 +95,4 @@ class Track(TrackGoal):
 
     def desired_yaw(self, memory: TrackMemory, state: State) -> Float[Array, " n"]:
         """Along world x."""
-        del state
         return jnp.zeros_like(memory.steps)

@@ -84,11 +84,7 @@ class AirSimCamera:
 
 
 def camera_of(where: str, image: Image) -> AirSimCamera:
-    """The camera that a text names, before AirSim is asked for it.
-
-    Args:
-        where: CAMERA, or CAMERA:RED,GREEN,BLUE for a mask.
-        image: image of the contract.
+    """The camera that a text names, before AirSim is asked for it: CAMERA, or CAMERA:RED,GREEN,BLUE for a mask.
 
     Raises:
         ValueError: naming the text and what is accepted; or naming an image that AirSim's cameras cannot provide.

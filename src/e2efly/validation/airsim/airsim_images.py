@@ -46,12 +46,7 @@ def image_request(dialect: Dialect, camera: str, image_type: int) -> dict[str, A
 
 
 def picture(answer: Any, request: Mapping[str, Any], dialect: Dialect) -> Picture:
-    """The picture in an answer to `simGetImages`.
-
-    Args:
-        answer: the answer to one request.
-        request: the request.
-        dialect: dialect of the server.
+    """The picture in an answer to one request of `simGetImages`.
 
     Raises:
         ValueError: naming the field, its value and what is accepted.

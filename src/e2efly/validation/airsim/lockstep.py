@@ -41,11 +41,7 @@ class AirSimSession:
     """One vehicle of one AirSim that is controlled, armed and paused."""
 
     def __init__(self, rpc: Rpc, vehicle: str = "") -> None:
-        """Take control of the vehicle.
-
-        Args:
-            rpc: a connected client.
-            vehicle: its name in the settings. Empty: the only vehicle.
+        """Take control of the vehicle with this name in the settings. Empty: the only vehicle.
 
         Raises:
             RpcError: naming what the server refuses, or saying that its clock cannot be stepped.

@@ -49,11 +49,6 @@ class Dialect:
     colours: str
     """Order of the colours in an uncompressed image (`RenderRequest::getScreenshot`)."""
 
-    @property
-    def image_methods(self) -> Mapping[str, tuple[str, ...]]:
-        """The methods in addition to `METHODS`, with their parameters."""
-        return {"simGetImages": self.image_parameters, "simGetCameraInfo": self.camera_parameters}
-
 
 DIALECTS: Mapping[int, Dialect] = {
     1: Dialect(

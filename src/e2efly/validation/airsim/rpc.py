@@ -33,12 +33,7 @@ class Rpc:
     """A connection to one server."""
 
     def __init__(self, host: str, port: int, timeout: float = TIMEOUT_S) -> None:
-        """Connect.
-
-        Args:
-            host: name or address.
-            port: port of the server.
-            timeout: longest time for the connection and for each answer, s.
+        """Connect. `timeout` is the longest time for the connection and for each answer, s.
 
         Raises:
             RpcError: when no server answers there.

@@ -21,12 +21,9 @@ pixels are square."""
 
 
 def settings(vehicle: Vehicle, images: Sequence[Image] = (), port: int = PORT) -> dict[str, Any]:
-    """The content of settings.json.
+    """The content of settings.json for a vehicle and the images of a contract.
 
-    Args:
-        vehicle: the vehicle after which AirSim's vehicle is named.
-        images: images of the policy's contract.
-        port: port on which AirSim listens, on this machine only.
+    AirSim listens on this machine only.
     """
     own: dict[str, Any] = {
         "VehicleType": "SimpleFlight",

@@ -5,7 +5,6 @@ from typing import ClassVar, Self, cast
 
 import numpy as np
 
-from e2efly.control import COMMAND_MODES
 from e2efly.flight.pilot.hover import controlled, rates_of
 from e2efly.policy.contract import Contract
 from e2efly.validation.airsim.airsim_camera import AirSimCamera, camera_of, opened, taken
@@ -70,9 +69,7 @@ class AirsimPlant(Plant):
         """Make the plant, and check one image of each of its cameras.
 
         Raises:
-            ValueError: for a command mode that does not lead to body rates and thrust, a camera that is not the
-                contract's, or answers that make no sense.
-            OSError: naming the address, when AirSim does not answer or refuses.
+            ValueError, OSError: as for the plant; or for a camera that is not the contract's.
         """
         images = {image.name: image for image in contract.images}
         asked = [camera_of(where, images[name]) for name, where in cls.cameras.items()]
@@ -89,9 +86,7 @@ class AirsimPlant(Plant):
         """Measured differences between AirSim's vehicle and the vehicle to which its flight controller is to be tuned.
 
         Raises:
-            ValueError: for a command mode that does not lead to body rates and thrust, or for answers that make no
-                sense.
-            OSError: naming the address, when AirSim does not answer or refuses.
+            ValueError, OSError: as for `of`.
         """
         plant = cls.of(vehicle, contract)
         try:
@@ -111,9 +106,7 @@ class AirsimPlant(Plant):
                 sense.
             OSError: naming the address, when AirSim does not answer or refuses.
         """
-        check_mode(mode, self.name)
-        if COMMAND_MODES[mode].controller is None:
-            raise ValueError(f"plant 'airsim' takes no {mode!r} commands; accepted: policies of other modes")
+        check_mode(mode, self.name, rates=True)
         self.vehicle, self.mode = vehicle, mode
         self._cameras: list[AirSimCamera] = []
         self._shutters: Mapping[str, Shutter] = {}
@@ -190,7 +183,6 @@ class AirsimPlant(Plant):
         return [shutter.exposed(len(self._films[name])) for name, shutter in self._shutters.items()]
 
     def _develop(self) -> None:
-        """Take the images that are due now."""
         for camera in self._cameras:
             shutter, film = self._shutters.get(camera.image.name), self._films.get(camera.image.name, [])
             image = None

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from e2efly.control import COMMAND_MODES, Vec3
+from e2efly.control import Vec3
 from e2efly.flight.betaflight.messages import set_raw_rc
 from e2efly.flight.betaflight.sticks import Sticks
 from e2efly.flight.pilot.hover import controlled
@@ -43,9 +43,7 @@ class BetaflightPlant(Plant):
             ValueError: for a command mode that does not lead to body rates and thrust.
             OSError: when the firmware cannot be built or started, or does not take off.
         """
-        check_mode(mode, self.name)
-        if COMMAND_MODES[mode].controller is None:
-            raise ValueError(f"plant 'betaflight' takes no {mode!r} commands; accepted: policies of other modes")
+        check_mode(mode, self.name, rates=True)
         from e2efly.validation import firmware_program
         from e2efly.validation.bridge_session import Session, rehearsal_settings
         from e2efly.validation.rig import Rig

@@ -55,16 +55,12 @@ def vehicle_xml(vehicle: Vehicle) -> str:
             f'<general name="motor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {spin * ratio}" dyntype="filter" '
             f'dynprm="{lag}" gainprm="{2 * k2 * hover + k1}" biastype="affine" biasprm="{k0 - k2 * hover**2}"/>'
         )
-    for axis, gear, drag in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_linear, strict=True):
-        actuators.append(
-            f'<general name="drag_{axis}" site="centre" gear="{gear} 0 0 0" gainprm="0" biastype="affine" '
-            f'biasprm="0 0 {-drag}"/>'
-        )
-    if vehicle.drag_torque is not None:
-        for axis, gear, drag in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), vehicle.drag_torque, strict=True):
+    drags = [("drag", "{} 0 0 0", vehicle.drag_linear), ("drag_torque", "0 0 0 {}", vehicle.drag_torque)]
+    for name, gear, drag in [row for row in drags if row[2] is not None]:
+        for axis, along, size in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), drag, strict=True):
             actuators.append(
-                f'<general name="drag_torque_{axis}" site="centre" gear="0 0 0 {gear}" gainprm="0" biastype="affine" '
-                f'biasprm="0 0 {-drag}"/>'
+                f'<general name="{name}_{axis}" site="centre" gear="{gear.format(along)}" gainprm="0" '
+                f'biastype="affine" biasprm="0 0 {-size}"/>'
             )
     entries = inertia_tensor(vehicle)[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].tolist()
     inertia = f'diaginertia="{" ".join(map(str, entries[:3]))}"'
@@ -101,13 +97,10 @@ class MujocoPlant(Plant):
     alters = EVERYTHING
 
     def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", largest_step: float = STEP) -> None:
-        """Make the plant, with the vehicle standing on the ground.
+        """Make the plant, with the vehicle standing on the ground and a flight controller that is tuned to it.
 
-        Args:
-            vehicle: as loaded. The flight controller is tuned to it.
-            command_mode: the mode of the commands of `step`: a name of `COMMAND_MODES`. Modes above `ctbr` go through
-                the bridge's own controllers before each step.
-            largest_step: longest step of MuJoCo and the rate loop, s.
+        Command modes above `ctbr` go through the bridge's own controllers before each step. `largest_step` is the
+        longest step of MuJoCo and the rate loop, s.
 
         Raises:
             ValueError: for an unknown command mode, or a step that is not positive.

@@ -25,12 +25,10 @@ class SimulatorPlant(Plant):
     alters = EVERYTHING
 
     def __init__(self, vehicle: Vehicle, command_mode: str = "ctbr", control_rate: float | None = None) -> None:
-        """Make the plant.
+        """Make the plant, with a flight controller that is tuned to the vehicle.
 
-        Args:
-            vehicle: as loaded. The flight controller is tuned to it.
-            command_mode: the mode of the commands of `step`.
-            control_rate: Hz. A whole number of physics steps fits into its period. If left out: the vehicle's own rate.
+        A whole number of physics steps fits into a period of the control rate, Hz, which is the vehicle's own if left
+        out.
 
         Raises:
             ValueError: for an unknown command mode, or a rate that is not positive.

@@ -103,17 +103,12 @@ class DistanceGrid:
 def clearance(
     grid: DistanceGrid, position: Float[Array, "n 3"], time: Float[Array, " n"] | None = None
 ) -> Float[Array, " n"]:
-    """Signed distance of points to the nearest surface, m, negative inside: `scene.clearance` for a grid.
+    """Signed distance of points (world) to the nearest surface, m, negative inside: `scene.clearance` for a grid.
 
     It is trilinear between the points of the grid, and differentiable. Outside the grid, the distance to the grid is
-    added to the value at its border. The result may be too large there, but never too small.
-
-    Args:
-        grid: the grid of the one world.
-        position: world, m.
-        time: not used, because nothing moves.
+    added to the value at its border. The result may be too large there, but never too small. Nothing moves, so the time
+    does not matter.
     """
-    del time
     most = jnp.asarray(grid.values.shape) - 1
     place = (position - grid.origin) / grid.cell
     inside = jnp.clip(place, 0.0, most)
@@ -214,7 +209,6 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _solid(scene: MeshScene, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Whether points are inside a solid."""
     with needed("mesh"):
         from e2efly.simulation.scenes.meshes.embree import Embree
 

@@ -27,9 +27,7 @@ _KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number
 def textured_materials(path: Path, materials: bool = True) -> set[str]:
     """Names of the materials of a file that have a texture, after a check that everything the file refers to exists.
 
-    Args:
-        path: the file of the mesh.
-        materials: whether materials and textures are used. If not, only what triangles need is looked for.
+    Without `materials`, only what triangles need is looked for.
 
     Raises:
         ValueError: naming the file, the missing item, and what is accepted.

@@ -34,14 +34,8 @@ def cast(
 ) -> dict[str, Array]:
     """The images of n sensors in the one world, also inside compiled programs. Images have no gradient.
 
-    Args:
-        scene: the world.
-        origin: start of the rays, world, m.
-        matrix: map from the sensor's frame to the world. Its columns may have any length, so that it also sets the
-            field of view.
-        pattern: directions of the rays.
-        channels: names from `CHANNELS`.
-        light: light for rgb. Its squares are not drawn, because the file gives the ground's colour.
+    The arguments are those of `e2efly.simulation.scenes.cast.cast`. The squares of the light are not drawn, because the
+    file gives the ground's colour.
 
     Returns:
         Images (n, h, w): `depth` along the ray's direction, `FAR` without a hit; `label`; `instance`; and (n, h, w, 3):
@@ -68,9 +62,7 @@ def _more(name: str) -> tuple[int, ...]:
 
 def _rays(pattern: Pattern) -> Float[np.ndarray, "3 r"]:
     """Directions of the rays in the order of the image's pixels."""
-    rows, columns, th, tw = pattern.layout
-    cut = pattern.tiles.reshape(rows, columns, 3, th, tw).transpose(2, 0, 3, 1, 4)
-    return np.ascontiguousarray(cut.reshape(3, -1), np.float32)
+    return np.ascontiguousarray(pattern.directions.reshape(-1, 3).T, np.float32)
 
 
 @functools.cache
@@ -105,7 +97,6 @@ def _seen(
     matrix: np.ndarray,
     *light: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Images of some cameras."""
     if channels == ("depth",):
         return {"depth": engine.depth(origin, matrix, rays)}
     hits = engine.hits(origin, matrix, rays)

@@ -107,7 +107,6 @@ class MeshScene:
 
     def at(self, time: Float[Array, " n"]) -> "MeshScene":
         """The world at any time. Nothing in it moves."""
-        del time
         return self
 
     def beside(self, other: "MeshScene") -> "MeshScene":
@@ -153,10 +152,7 @@ class MeshScene:
     ) -> Float[np.ndarray, "r 3"]:
         """RGB at points of triangles, from the nearest texel of the texture.
 
-        Args:
-            face: triangle of each point.
-            u: weight of the triangle's second corner.
-            v: weight of the triangle's third corner.
+        `u` and `v` are the weights of the triangle's second and third corner.
         """
         weight = np.stack([1 - u - v, u, v], axis=1)[:, None]
         texels, begins, sizes = self._texels

@@ -49,13 +49,10 @@ class Near:
         return Near(scene, low, high, bears, level)
 
     def distance(self, path: Float[np.ndarray, "n 3"], within: float = math.inf) -> float:
-        """The smallest distance of the points of a path to triangles that must not be touched, m.
+        """The smallest distance of consecutive points (world) to triangles that must not be touched, m.
 
         It is 0 if the path goes through any triangle between two points, and infinite if there are no such triangles.
-
-        Args:
-            path: consecutive points, world, m.
-            within: distance beyond which triangles may count as infinitely far, m.
+        Triangles beyond `within`, m, may count as infinitely far.
         """
         points = np.asarray(path, np.float32)
         if self._crossed(points):

@@ -98,24 +98,15 @@ def noise(rng: np.random.Generator, roughness: float, size: int = TEXELS) -> Flo
     return wave / wave.std()
 
 
-def speckled(
-    rng: np.random.Generator, colour: Any, contrast: float, roughness: float = 0.8
-) -> UInt8[np.ndarray, "h w 3"]:
+def speckled(rng: np.random.Generator, colour: Any, contrast: float) -> UInt8[np.ndarray, "h w 3"]:
     """One colour, RGB in [0, 1], with random variations of brightness."""
-    return _image(np.asarray(colour) * (1 + contrast * noise(rng, roughness)[..., None]))
+    return _image(np.asarray(colour) * (1 + contrast * noise(rng, 0.8)[..., None]))
 
 
-def striped(
-    rng: np.random.Generator, colour: Any, lines: int, courses: int = 0, contrast: float = 0.06
-) -> UInt8[np.ndarray, "h w 3"]:
-    """Vertical joints, `lines` per metre. With `courses` (an even number) they are laid in bond, like blocks."""
-    image = np.asarray(colour) * (1 + contrast * noise(rng, 0.8)[..., None])
-    row, column = np.indices((TEXELS, TEXELS))
-    shift = 0
-    if courses:
-        image[row * courses % TEXELS < 2 * courses] *= 0.6
-        shift = (row * courses // TEXELS % 2) * TEXELS // (2 * lines)
-    image[(column + shift) * lines % TEXELS < 2 * lines] *= 0.6
+def striped(rng: np.random.Generator, colour: Any, lines: int) -> UInt8[np.ndarray, "h w 3"]:
+    """Vertical joints, `lines` per metre."""
+    image = np.asarray(colour) * (1 + 0.06 * noise(rng, 0.8)[..., None])
+    image[:, np.arange(TEXELS) * lines % TEXELS < 2 * lines] *= 0.6
     return _image(image)
 
 

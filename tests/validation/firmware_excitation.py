@@ -55,19 +55,10 @@ def fly_excited(
     sag: float = 0.0,
     seed: int = 0,
 ) -> Excited:
-    """Take off, fly the excitation, hover and land.
+    """Take off, fly the excitation, hover and land. The delay of the poses follows from the latency of the body.
 
-    Args:
-        firmware: the built firmware.
-        believed: the vehicle of the bridge.
-        body: body of the world. The delay of the poses follows from its latency.
-        settings: settings of the flight.
-        options: options of the excitation. If left out: the defaults.
-        log: keeps the flight's record.
-        folder: folder of the firmware's files. If left out: a temporary one.
-        blackbox: whether the firmware writes its own log into the folder.
-        sag: share of the thrust that is lost by the end of the excitation, at a constant rate.
-        seed: seed of the poses' noise.
+    `sag` is the share of the thrust that is lost by the end of the excitation, at a constant rate. `folder` gets the
+    files of the firmware and, with `blackbox`, its own log. If left out, it is a temporary one.
 
     Raises:
         ValueError: for a fence that is too small.

@@ -104,9 +104,7 @@ class _Hand:
 def fly_steps(rig: Rig, shares: tuple[float, ...] = (1.0, -1.0, 0.6, -0.6)) -> tuple[Record, list[SetpointStep]]:
     """Take off, and fly steps of roll, pitch and yaw rate and of thrust in both directions, with pauses between them.
 
-    Args:
-        rig: a started rig. Its body is the vehicle that it carries.
-        shares: factors on `SIZES`. Each gives one step of each command.
+    Each share of `SIZES` gives one step of each command.
 
     Returns:
         The values of gyroscope, accelerometer, poses and motor outputs at every step of the rig, with the commands as
