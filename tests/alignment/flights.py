@@ -17,7 +17,7 @@ USUAL = Sensors()
 
 def flown(body: Vehicle, seconds: float, sensors: Sensors = USUAL, seed: int = 0, **excitation: Any) -> Record:
     """The record of a body whose flight controller believes in the file."""
-    plant = find_plant("mujoco")(FILE)
+    plant = find_plant("mujoco")(FILE)  # type: ignore[call-arg]
     plant.meet(body)
     return sensed(fly_excitation(plant, FILE, body.latency, seconds=seconds, **excitation), sensors, seed)
 
