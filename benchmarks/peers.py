@@ -17,9 +17,8 @@ PEERS = {
 """By name: the script that prints physics steps/s, on how many XLA devices to run it, and what it needs."""
 
 
-def interpreter(peer: str) -> Path:
-    """The Python that has a peer."""
-    needs = PEERS[peer][2]
+def interpreter(*needs: str) -> Path:
+    """The Python of a virtual environment that has what is needed."""
     folder = cache_folder() / needs[0].replace("==", "-").replace("[batched]", "")
     python = folder / "bin" / "python"
     if not (folder / ".ready").exists():
@@ -31,23 +30,17 @@ def interpreter(peer: str) -> Path:
 
 def packages(*needs: str) -> Path:
     """The folder of packages of a virtual environment that has what is needed, for this Python to import them from."""
-    folder = cache_folder() / needs[0].replace("==", "-")
-    python = folder / "bin" / "python"
-    if not (folder / ".ready").exists():
-        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "--quiet", *needs], check=True)
-        (folder / ".ready").touch()
-    where = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('platlib'))"]
+    where = [str(interpreter(*needs)), "-c", "import sysconfig; print(sysconfig.get_path('platlib'))"]
     return Path(subprocess.run(where, capture_output=True, text=True, check=True).stdout.strip())
 
 
 def physics_steps(peer: str, vehicles: int) -> float:
     """A peer's physics steps/s: the best of its numbers of devices."""
-    script, counts, _ = PEERS[peer]
+    script, counts, needs = PEERS[peer]
     found = []
     for devices in counts:
         flags = {**os.environ, "XLA_FLAGS": f"--xla_force_host_platform_device_count={devices}"}
-        command = [str(interpreter(peer)), str(Path(__file__).parent / script), str(vehicles)]
+        command = [str(interpreter(*needs)), str(Path(__file__).parent / script), str(vehicles)]
         done = subprocess.run(command, env=flags, capture_output=True, text=True, check=False)
         if done.returncode:
             raise SystemExit(f"{peer} could not be measured:\n{done.stderr}")

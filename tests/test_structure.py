@@ -1,10 +1,14 @@
 """The house: no import circle, also where imports hide; one name for one class; one room for a file's name."""
 
 import ast
+import subprocess
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+
+import pytest
 
 import e2efly
 
@@ -61,3 +65,17 @@ def test_no_file_name_stands_in_two_rooms() -> None:
 
 def test_nothing_is_loose_at_the_top() -> None:
     assert {path.name for path in ROOT.glob("*.py")} == {"__init__.py", "__main__.py", "api.py"}
+
+
+@pytest.mark.parametrize(
+    ("loaded", "absent"),
+    [
+        ("control", "jax"),
+        ("validation.fleet, e2efly.validation.plants.mujoco", "jax"),
+        ("commands.fly_report, e2efly.viewing.flight_report, e2efly.viewing.flight_health", "jax"),
+        ("viewing.watch.beside", "jax, viser"),
+    ],
+)
+def test_what_flies_or_reports_loads_no_simulator(loaded: str, absent: str) -> None:
+    code = f"import sys, e2efly.{loaded}; sys.exit(any(name in sys.modules for name in {absent.split(', ')}))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,29 +16,18 @@ from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.readers import read_flights
 from e2efly.logs.recording import Record, Stream
-from e2efly.logs.telemetry import Telemetry
-from e2efly.validation.plant_excitation import PERFECT, Sensors, fly_excitation, sensed
-from e2efly.validation.plants import find_plant
+from e2efly.validation.plant_excitation import PERFECT, Sensors
 from e2efly.vehicles.loading import load_vehicle, read_sigmas
-from e2efly.vehicles.vehicle import Vehicle
+from tests.alignment.flights import FILE, as_mcap, flown
 
-FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(FILE, rate_gain=FILE.rate_gain * [1.3, 0.75, 1.2], latency=0.035)
 POSES = 0.02
 """Delay of the poses that is part of the vehicle's latency, s."""
 
 
-def flown(vehicle: Vehicle, seconds: float = 8.0, sensors: Sensors = PERFECT, excited: bool = True) -> Record:
-    plant = find_plant("mujoco")(FILE)
-    plant.meet(vehicle)
-    speed = 4.0 if excited else 0.0
-    record = fly_excitation(plant, FILE, vehicle.latency, seconds=seconds, speed=speed, pulses=excited)
-    return sensed(record, sensors, 0)
-
-
 @pytest.fixture(scope="module")
 def record() -> Record:
-    return flown(BODY, sensors=Sensors(pose_delay=0.0))
+    return flown(BODY, 8.0, Sensors(pose_delay=0.0))
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +55,7 @@ def test_the_error_falls_where_the_fit_did_not_look(found: Alignment) -> None:
 
 def test_the_replay_of_the_right_vehicle_is_the_flight() -> None:
     """MuJoCo's flight, by the physics: rotors begin as the commands before the start left them."""
-    record = flown(FILE, 4.0)
+    record = flown(FILE, 4.0, PERFECT)
     starts = 0.5 + 0.4 * np.arange(8)
     flight = stretches(record, starts, 0.4)
     model = Model.of(FILE, "command", FILE, ("latency",))
@@ -80,18 +68,7 @@ def test_the_replay_of_the_right_vehicle_is_the_flight() -> None:
 
 def test_a_log_of_ours_says_how_late_its_poses_were(tmp_path: Path, record: Record) -> None:
     """40 ms that their source did not tell, and 5 ms of age."""
-    begin = time.monotonic()
-    with Telemetry(tmp_path / "flight.mcap", queue_size=100_000) as log:
-        names = {"body_rate": "gyro", "specific_force": "specific_force"}
-        for name, field in names.items():
-            for at, value in zip(record.streams[name].time, record.streams[name].values.tolist(), strict=True):
-                log.record("imu", begin + 1 + at, {field: value})
-        poses = [record.streams[name] for name in ("position", "velocity", "quaternion")]
-        for at, position, velocity, quaternion in zip(poses[0].time, *(s.values.tolist() for s in poses), strict=True):
-            motion = {"position": position, "velocity": velocity, "quaternion": quaternion}
-            log.record("odometry", begin + 1 + at + 0.045, {"age": 0.005, **motion})
-        for at, command in zip(record.streams["command"].time, record.streams["command"].values.tolist(), strict=True):
-            log.record("command", begin + 1 + at, {"collective_thrust": command[0], "body_rate": command[1:]})
+    as_mcap(record, tmp_path / "flight.mcap", late=0.045, age=0.005)
     read = read_flights(tmp_path / "flight.mcap")
     late, how, known = pose_delay_of(None, checked(read, FILE))
     assert known and late == pytest.approx(0.045, abs=2e-3) and "by the log" in how
@@ -152,7 +129,7 @@ def test_logs_that_cannot_be_aligned_are_refused_and_nothing_is_written(
     mute = {name: stream for name, stream in record.streams.items() if name != "command"}
     assert "accepted: command in every flight, besides body_rate" in refusal(mute)
     assert "--pose-delay is -1.0; accepted: 0 to 1 s" in refusal(dict(record.streams), "--pose-delay", "-1")
-    calm = refusal(dict(flown(FILE, 6.0, Sensors(pose_delay=0.0), excited=False).streams))
+    calm = refusal(dict(flown(FILE, 6.0, Sensors(pose_delay=0.0), speed=0.0, pulses=False).streams))
     for name in ("rate_gain of roll", "rate_gain of pitch", "rate_gain of yaw", "the delay"):
         assert f"{name} cannot be had" in calm
     assert "fly steps or doublets of roll rate, 2 rad/s and more" in calm

@@ -7,11 +7,8 @@ import numpy as np
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.model import Model
 from e2efly.alignment.windows import cut
-from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
-from e2efly.validation.plants import find_plant
-from e2efly.vehicles.loading import load_vehicle
+from tests.alignment.flights import FILE, flown
 
-FILE = load_vehicle("vis_r")
 FAR = dataclasses.replace(
     FILE,
     mass=1.25 * FILE.mass,
@@ -24,9 +21,7 @@ FAR = dataclasses.replace(
 
 
 def test_the_search_ends_near_a_vehicle_that_is_far_from_its_file() -> None:
-    plant = find_plant("mujoco")(FILE)
-    plant.meet(FAR)
-    record = sensed(fly_excitation(plant, FILE, FAR.latency, seconds=8.0), Sensors(), 0)
+    record = flown(FAR, 8.0)
     model = Model.of(dataclasses.replace(FILE, mass=FAR.mass), "command", FILE)
     p = dict(zip((u.name for u in model.unknowns), begin(model, cut(record, "command", 0)), strict=True))
     assert np.isclose(p["thrust"], np.log(0.8), atol=0.1)

@@ -4,7 +4,6 @@ import dataclasses
 import re
 import shlex
 import shutil
-import time
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,12 +13,9 @@ import pytest
 from e2efly.alignment import parts
 from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
-from e2efly.logs.recording import Record
-from e2efly.logs.telemetry import Telemetry
-from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
-from e2efly.validation.plants import find_plant
+from e2efly.validation.plant_excitation import Sensors
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.vehicles.vehicle import Vehicle
+from tests.alignment.flights import FILE, as_mcap, flown
 from tests.alignment.test_stand import write
 
 PAGE = Path(__file__).parents[2] / "docs" / "identification.md"
@@ -28,29 +24,7 @@ FIRMWARE = ".BBL"
 has it."""
 EVERY = sorted(set(re.findall(r"(?m)(?:(?<=^    )|(?<=`))e2efly identify [^`\n]+", PAGE.read_text("utf-8"))))
 COMMANDS = [command for command in EVERY if FIRMWARE not in command]
-FILE = load_vehicle("vis_r")
-
-
-def flown(body: Vehicle, seed: int, seconds: float = 6.0) -> Record:
-    plant = find_plant("mujoco")(FILE)
-    plant.meet(body)
-    return sensed(fly_excitation(plant, FILE, body.latency, seconds=seconds), Sensors(gaps=0, pose_delay=0.0), seed)
-
-
-def as_mcap(record: Record, path: Path) -> None:
-    """By way of the bridge's telemetry: it says no rotor speeds."""
-    start, at = time.monotonic(), {name: s.time for name, s in record.streams.items()}
-    with Telemetry(path) as telemetry:
-        streams = {name: s.values for name, s in record.streams.items()}
-        for i, t in enumerate(at["body_rate"]):
-            imu = {"gyro": streams["body_rate"][i].tolist(), "specific_force": streams["specific_force"][i].tolist()}
-            telemetry.record("imu", start + t, imu)
-        for i, t in enumerate(at["position"]):
-            motion = {name: streams[name][i].tolist() for name in ("position", "velocity", "quaternion")}
-            telemetry.record("odometry", start + t, {"age": 0.0, "body_rate": [0.0, 0.0, 0.0], **motion})
-        for t, command in zip(at["command"], streams["command"], strict=True):
-            sent = {"collective_thrust": float(command[0]), "body_rate": command[1:].tolist()}
-            telemetry.record("command", start + t, sent)
+SENSORS = Sensors(gaps=0, pose_delay=0.0)
 
 
 def stand(path: Path) -> None:
@@ -87,10 +61,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text += f"periods = {[round(float(10 * period) + x, 3) for x in (0.0, 0.05, -0.05)]}\n"
     (folder / "pendulum.toml").write_text(text)
     stand(folder / "stand.csv")
-    record = flown(body, 0)
+    record = flown(body, 6.0, SENSORS)
     for name in ("a", "c"):
-        write_csv(record if name != "c" else flown(body, 2), folder / f"{name}.csv")
-    as_mcap(flown(body, 1), folder / "b.mcap")
+        write_csv(record if name != "c" else flown(body, 6.0, SENSORS, 2), folder / f"{name}.csv")
+    as_mcap(flown(body, 6.0, SENSORS, 1), folder / "b.mcap")
     theirs = (folder / "a.csv").read_text().replace("az", "acc_z", 1).replace("wx", "gyro_x", 1)
     lines = theirs.splitlines()
     column = lines[0].split(",").index("acc_z")

@@ -16,8 +16,8 @@ from e2efly.validation.plant_excitation import PERFECT, Sensors, fly_excitation,
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
+from tests.alignment.flights import FILE, flown
 
-FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(
     FILE,
     mass=0.9,
@@ -31,18 +31,9 @@ BODY = dataclasses.replace(
 )
 
 
-USUAL = Sensors()
-
-
-def flown(seconds: float = 10.0, sensors: Sensors = USUAL, seed: int = 0, sag: float = 0.04) -> Record:
-    plant = find_plant("mujoco")(FILE)
-    plant.meet(BODY)
-    return sensed(fly_excitation(plant, FILE, BODY.latency, seconds=seconds, sag=sag), sensors, seed)
-
-
 @pytest.fixture(scope="module")
 def record() -> Record:
-    return flown()
+    return flown(BODY, 10.0, sag=0.04)
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +180,7 @@ def test_a_log_of_steps_gives_delay_and_rate_loop_alone(record: Record) -> None:
 
 
 def test_logs_without_what_is_needed_are_refused_by_name(tmp_path: Path) -> None:
-    record = flown(1.6, PERFECT, sag=0.0)
+    record = flown(BODY, 1.6, PERFECT)
     bare = dataclasses.replace(record, streams={"body_rate": record.streams["body_rate"]})
     with pytest.raises(ValueError, match="has the streams body_rate; accepted: command or rotor_speed or motor"):
         identify(FILE, [bare])

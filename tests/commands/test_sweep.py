@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,24 +24,9 @@ def request(*vary: str, seeds: int = 1) -> Sweep:
 
 
 def sweep(cwd: Path, *flags: str) -> subprocess.Popen[str]:
-    command = [
-        sys.executable,
-        "-m",
-        "e2efly",
-        "sweep",
-        "hover",
-        "--algo",
-        "ppo",
-        "--preset",
-        "nominal",
-        "--out",
-        "sweep",
-        *flags,
-    ]
-    environment = os.environ | {"XLA_FLAGS": QUICK}
-    return subprocess.Popen(
-        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
-    )
+    asked = ["-m", "e2efly", "sweep", "hover", "--algo", "ppo", "--preset", "nominal", "--out", "sweep"]
+    streams: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    return subprocess.Popen([sys.executable, *asked, *flags], cwd=cwd, env=os.environ | {"XLA_FLAGS": QUICK}, **streams)
 
 
 def test_every_value_goes_with_every_other_and_every_seed() -> None:

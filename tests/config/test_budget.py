@@ -13,43 +13,23 @@ from e2efly.runs import presets
 from e2efly.tasks import TASKS
 
 SMALL = presets.preset("hover", "ppo")
+PPO = "train hover --algo ppo --preset nominal"
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         ("train hover --steps 1" + 15 * "0", "days, even at 100 million steps per second; accepted: what takes at mo"),
-        (
-            "train hover --algo ppo --preset nominal --steps 10" + 12 * "0",
-            "accepted: at most 8796093018112: int32 counts updates and samples",
-        ),
-        (
-            "train hover --algo ppo --preset nominal --algo.envs 2000000000",
-            "algo.envs is 2000000000, algo.horizon 64, with 21 observed numb",
-        ),
-        (
-            "train hover --algo ppo --preset nominal --algo.horizon 2000000000",
-            "algo.envs is 64, algo.horizon 2000000000, with 21 observed",
-        ),
-        (
-            "train hover --algo ppo --preset nominal --algo.epochs 2000000000",
-            "chunk 20, algo.epochs 2000000000: about 588 days, even",
-        ),
-        (
-            "train hover --algo ppo --preset nominal --network.hidden 200000 200000",
-            "network.hidden is (200000, 200000), recurrent 0, encoder",
-        ),
+        (f"{PPO} --steps 10" + 12 * "0", "accepted: at most 8796093018112: int32 counts updates and samples"),
+        (f"{PPO} --algo.envs 2000000000", "algo.envs is 2000000000, algo.horizon 64, with 21 observed numb"),
+        (f"{PPO} --algo.horizon 2000000000", "algo.envs is 64, algo.horizon 2000000000, with 21 observed"),
+        (f"{PPO} --algo.epochs 2000000000", "chunk 20, algo.epochs 2000000000: about 588 days, even"),
+        (f"{PPO} --network.hidden 200000 200000", "network.hidden is (200000, 200000), recurrent 0, encoder"),
         ("train hover --network.recurrent 1000000", "recurrent 1000000, encoder (64,), convolution ()"),
         ("train hover --chunk 1000000000", "chunk is 1000000000: about 4 TB of memory; accepted: what fits into the"),
-        (
-            "train hover --algo ppo --preset nominal --eval-episodes 1000000000",
-            "eval_episodes is 1000000000, with 21 observed numbers: about 1.1",
-        ),
+        (f"{PPO} --eval-episodes 1000000000", "eval_episodes is 1000000000, with 21 observed numbers: about 1.1"),
         ("train hover --algo abpt --algo.buffer 2000000000", "algo.buffer is 2000000000: about"),
-        (
-            "train hover --algo abpt --algo.fits 2000000000",
-            "algo.fits 2000000000, algo.minibatch 1024: about",
-        ),
+        ("train hover --algo abpt --algo.fits 2000000000", "algo.fits 2000000000, algo.minibatch 1024: about"),
         ("train avoid --task.forest.room 1000000000", "task.forest.room 1000000000, images of 32 x 12: about"),
         ("train avoid --network.convolution 1000000", "convolution (1000000,), with 30 observed numbers"),
         ("eval hover --episodes 10000000000", "--episodes is 10000000000: about 2 TB of memory; accepted: what fits"),

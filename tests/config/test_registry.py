@@ -65,10 +65,7 @@ def test_a_file_of_ones_own_is_found_again_by_its_reference(file: Path) -> None:
         ("{file}:Unregistered", "accepted: what its file registers as task"),
         ("no.such.module:Mine", "no.such.module cannot be imported: ModuleNotFoundError"),
         ("{folder}/broken.py:Mine", r"broken.py cannot be imported: ZeroDivisionError: division by zero"),
-        (
-            "{folder}/taken.py:Mine",
-            r"'hover' of .*taken.py:Mine is also the name of e2efly.tasks.hover:HoverConfig",
-        ),
+        ("{folder}/taken.py:Mine", r"'hover' of .*taken.py:Mine is also the name of e2efly.tasks.hover:HoverConfig"),
         ("{folder}/word.py:Mine", r"task 'my task' of .*word.py:Mine; accepted: a name of letters, digits and _"),
         ("{folder}/circle.py:Mine", r"circle.py has no Mine yet: it imports itself"),
         ("{folder}/plain.py:Mine", r"task 'plain' is .*plain.py:Mine; accepted: a class that extends .*:TaskConfig"),

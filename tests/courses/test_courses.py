@@ -11,13 +11,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.courses import tracks
 from e2efly.courses.gates import Gates
 from e2efly.courses.origin import Origin
 from e2efly.courses.references import Lissajous, Polynomials, Spline, read_csv
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.environment import random_key
+from e2efly.policy.goal import Shape
 from e2efly.simulation.scenes import course as _registered  # JAX knows gates by it  # noqa: F401
+from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.splines import polynomial
+from e2efly.tasks.track.world import Track
 
 CURVES = [Lissajous.circle(2.0, 0.2 * np.pi), Lissajous.lemniscate(2.0, 3.0)]
 
@@ -105,46 +109,64 @@ def test_a_placed_track_is_flown_by_the_placed_flight(name: str) -> None:
     assert placed.start_yaw == pytest.approx(track.start_yaw - 2.0)
 
 
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (("[0.0, 0.0", "[1e30, 0.0"), "start.position is .*at most 10000 in size"),
-        (("closed = true", "closed = [true]"), r"closed is \[True\]; accepted: true or false"),
-        (("yaw = 45.0", "yaw = 1e308"), "yaw is 1e.308; accepted: a finite number, at most 10000 in size"),
-        (("yaw = 45.0", "yaw = 1" + "0" * 400), r"yaw is 1000.*\.\.\.; accepted: a finite number"),
-    ],
-)
-def test_numbers_of_a_track_that_cannot_be_are_named(change: tuple[str, str], told: str, tmp_path: Path) -> None:
-    text = """
-closed = true
-start = {position = [0.0, 0.0, 1.0], yaw = 45.0}
-gates = [
-  {position = [2.0, 0.0, 1.5], yaw = 0.0, opening = [1.0, 1.0]},
-  {position = [4.0, 0.0, 1.5], yaw = 0.0, opening = [1.0, 1.0]},
+BROKEN_TRACKS = [
+    ("closed = true", "closed = 1", "closed is 1; accepted: true or false"),
+    ("closed = true", "closed = [true]", r"closed is \[True\]; accepted: true or false"),
+    ("closed = true", "closed =", "not a TOML file"),
+    ("closed = true\n", "", "the file has"),
+    ("gates = [", "gates = 3\nother = [", "the file has"),
+    ("opening = [1.0, 1.0] },\n]", "opening = [0.2, 1.0] },\n]", r"gates\[3\].opening is \[0.2, 1.0\]"),
+    ("opening = [1.0, 1.0]", "opening = 1.0", r"gates\[0\].opening is 1.0; accepted: 2 finite"),
+    ("[4.0, 4.0, 1.0]", "[4.0, nan, 1.0]", r"gates\[0\].position is"),
+    ("[4.0, 4.0, 1.0]", "[4.0, 4.0, 0.2]", "an opening above the ground"),
+    ("position = [4.0, 4.0, 1.0], yaw = 0.0,", "yaw = 0.0,", r"gates\[0\] has \['opening', 'yaw'\]"),
+    ("yaw = -86.0", 'yaw = "east"', r"gates\[1\].yaw is 'east'; accepted: a finite number"),
+    ("yaw = -86.0", "yaw = inf", r"gates\[1\].yaw is inf; accepted: a finite number"),
+    ("[0.0, 0.0, 1.5]", "[0.0, 0.0]", r"start.position is \[0.0, 0.0\]; accepted: 3 finite"),
+    ("[0.0, 0.0, 1.5]", "[1e30, 0.0, 1.5]", "start.position is .*at most 10000 in size"),
+    ("yaw = 45.0", "yow = 45.0", "start has"),
+    ("yaw = 45.0", "yaw = true", r"start.yaw is True"),
+    ("yaw = 45.0", "yaw = 1e308", "yaw is 1e.308; accepted: a finite number, at most 10000 in size"),
+    ("yaw = 45.0", "yaw = 1" + "0" * 400, r"yaw is 1000.*\.\.\.; accepted: a finite number"),
 ]
-"""
-    (tmp_path / "track.toml").write_text(text)
-    assert load_track(str(tmp_path / "track.toml")).start_yaw == pytest.approx(np.pi / 4)
-    assert change[0] in text
-    (tmp_path / "track.toml").write_text(text.replace(*change))
-    with pytest.raises(ValueError, match=f"track.toml: .*{told}"):
-        load_track(str(tmp_path / "track.toml"))
+
+
+@pytest.mark.parametrize(("old", "new", "told"), BROKEN_TRACKS)
+def test_broken_tracks_are_named(old: str, new: str, told: str, tmp_path: Path) -> None:
+    text, file = (Path(tracks.__file__).parent / "four_gates.toml").read_text(), tmp_path / "mine.toml"
+    file.write_text(text)
+    assert load_track(str(file)).name == "mine"
+    assert load_track(str(file)).start_yaw == pytest.approx(np.pi / 4)
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=f"mine.toml: .*{told}"):
+        load_track(str(file))
+
+
+HEAD = "t,x,y,z\n"
 
 
 @pytest.mark.parametrize(
-    ("rows", "told"),
+    ("text", "told"),
     [
-        ("0,0,0,1\n1,0,0,1\n1e12,0,0,1", "line 4: .*over at most 3600 s"),
-        ("0,0,0,1\n1,1e30,0,1\n2,0,0,1", "line 3: .*at most 10000 in size"),
-        ("0,0,0,1\n1e-300,1,0,1\n2e-300,1,0,1", "line 3: .*by at least 0.001 s"),
-        ("0,0,0," + "1" * 200_000, "cannot be read: field larger than field limit"),
-        ("0,0,0,nan\n1,0,0,1\n2,0,0,1", "line 2: "),
+        ("", "line 1: empty"),
+        ("time,x,y,z\n", "line 1"),
+        (HEAD + "0,0,0,1\n1,0,0,1\n", "2 rows"),
+        (HEAD + "0,0,0,1\n0,0,0,1\n2,0,0,1\n", "line 3"),
+        (HEAD + "0,0,0,1\n1,nan,0,1\n2,0,0,1\n", "line 3"),
+        (HEAD + "0,0,0,1\n1,0,1\n2,0,0,1\n", "line 3"),
+        (HEAD + "0,0,0,0\n1,0,0,1\n2,0,0,1\n", "lowest z is 0.0 m"),
+        (HEAD + "0,0,0,1\n1,0,0,1\n1e12,0,0,1\n", "line 4: .*over at most 3600 s"),
+        (HEAD + "0,0,0,1\n1,1e30,0,1\n2,0,0,1\n", "line 3: .*at most 10000 in size"),
+        (HEAD + "0,0,0,1\n1e-300,1,0,1\n2e-300,1,0,1\n", "line 3: .*by at least 0.001 s"),
+        (HEAD + "0,0,0," + "1" * 200_000, "cannot be read: field larger than field limit"),
+        (HEAD + "0,0,0,nan\n1,0,0,1\n2,0,0,1\n", "line 2: "),
     ],
 )
-def test_a_reference_that_cannot_be_flown_is_refused(rows: str, told: str, tmp_path: Path) -> None:
-    (tmp_path / "way.csv").write_text(f"t,x,y,z\n{rows}\n")
+def test_a_reference_that_cannot_be_flown_is_refused(text: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text(text)
     with pytest.raises(ValueError, match=rf"way.csv.*{told}"):
-        read_csv(tmp_path / "way.csv")
+        Track.of(TrackConfig(reference=str(tmp_path / "way.csv")), Shape(0.05, 0.12))
 
 
 def test_a_reference_with_a_byte_order_mark(tmp_path: Path) -> None:

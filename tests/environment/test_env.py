@@ -16,14 +16,9 @@ from e2efly.environment.env_state import STARTS
 from e2efly.learning.judge import CONFIRMED, REPORTED, WATCHED
 from e2efly.runs import presets
 from e2efly.simulation.physics.rotation import yaw_pitch_roll
-from e2efly.simulation.sensors import imu
-from e2efly.simulation.sensors.latency import acting_commands, delayed_state
-from e2efly.simulation.sensors.noise import add_noise
 from e2efly.tasks import TASKS
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.hover import HoverConfig
-from e2efly.tasks.land import LandConfig
-from e2efly.tasks.task import at_rest
 from e2efly.tasks.track import TrackConfig
 
 REWARD = RewardConfig({"prog2": 1.0, "anglev": 0.1})
@@ -112,19 +107,6 @@ def test_a_new_start_is_a_reset() -> None:
         np.testing.assert_allclose(a, b, rtol=2e-6, atol=1e-7)
 
 
-def test_only_ended_episodes_start_anew() -> None:
-    env = make()
-    state, _ = reset(env, random_key(0), 6)
-    late = jnp.where(jnp.arange(6) % 2 == 0, env.task.episode_s - env.control_period, state.time)
-    state = dataclasses.replace(state, time=late)
-    again, out = jax.jit(env.step)(state, jnp.zeros((6, 4)))
-    on, _ = jax.jit(partial(env.step, restart=False))(state, jnp.zeros((6, 4)))
-    np.testing.assert_array_equal(again.time[1::2], on.time[1::2])
-    np.testing.assert_array_equal(again.time[::2], 0)
-    np.testing.assert_array_equal(out.observation[1::2], out.final_observation[1::2])
-    assert not np.any(np.all(out.observation[::2] == out.final_observation[::2], axis=-1))
-
-
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", ["hover", "land_visual"])
 def test_what_a_critic_knows_is_of_what_was_reached_before_new_starts(name: str) -> None:
@@ -139,77 +121,9 @@ def test_what_a_critic_knows_is_of_what_was_reached_before_new_starts(name: str)
     np.testing.assert_allclose(out.final_privileged, jax.jit(env.privileged)(reached), rtol=1e-5, atol=1e-6)
 
 
-def test_time_out_is_told_apart_from_termination() -> None:
-    env = make(HoverConfig(episode_s=0.1, hold_s=0.1, position=0.1))  # three steps, far from everything
-    state, _ = reset(env, random_key(0), 4)
-    step = jax.jit(env.step)
-    for i in range(3):
-        state, out = step(state, jnp.broadcast_to(env.hover, (4, 4)))
-        assert bool(out.truncated.all()) == (i == 2)
-        assert not out.terminated.any()
-    assert np.all(state.time == 0)
-    low = make(LandConfig(height=(0.0, 0.001), velocity=0.0))
-    state, _ = reset(low, random_key(0), 4)
-    advance = jax.jit(lambda state, action: low.step(state, action, restart=False))
-    for _ in range(10):
-        state, out = advance(state, -jnp.ones((4, 4)))
-    assert out.terminated.all()
-    assert not out.truncated.any()
-
-
-def test_randomising_the_plant_does_not_move_the_action_map() -> None:
-    plain, random = make(), make(randomize={"mass": 0.3, "thrust_map": 0.2})
-    action = jnp.array([[0.2, -0.5, 0.1, 0.9]])
-    np.testing.assert_array_equal(plain.command(action), random.command(action))
-    state, _ = reset(random, random_key(0), 500)
-    factor = np.asarray(state.plant["mass"]) / 0.75
-    assert 0.7 <= factor.min() < 0.71
-    assert 1.29 < factor.max() <= 1.3
-    assert state.plant["thrust_map"].shape == (500, 3)
-
-
-def test_wind_and_latency_are_drawn_an_episode() -> None:
-    env = make(wind=2.0, action_latency=(0.02, 0.08))
-    state, _ = reset(env, random_key(0), 500)
-    assert np.linalg.norm(state.wind, axis=-1).max() <= 2 + 1e-5
-    assert 0.02 <= state.action_latency.min() < 0.021
-    assert 0.079 < state.action_latency.max() <= 0.08
-
-
-@pytest.mark.parametrize("late", [0.0, 0.5, 1.0, 1.8, 2.7])
-def test_commands_are_late_by_real_seconds(late: float) -> None:
-    period, fine = 0.1, 1000
-    issued = np.random.default_rng(0).normal(size=(20, 4)).astype(np.float32)
-    queue = np.zeros((1, 5, 4), np.float32)
-    for k, command in enumerate(issued):
-        queue = np.concatenate([command[None, None], queue[:, :-1]], axis=1)
-        old, new, switch = acting_commands(jnp.asarray(queue), jnp.array([late * period]), period)
-        for i in range(0, fine, 50):
-            t = (k + (i + 0.5) / fine) * period
-            source = int(np.floor(t / period - late + 1e-6))  # the last command issued at least `late` periods ago
-            expected = issued[source] if source >= 0 else np.zeros(4)
-            acting = new if (i + 0.5) / fine * period >= float(switch[0]) else old
-            np.testing.assert_allclose(acting[0], expected, atol=1e-6)
-
-
-@pytest.mark.whole
-@pytest.mark.usefixtures("x64")
-def test_the_gradient_flows_through_the_latency() -> None:
-    env = Env.of(HoverConfig(), REWARD, EnvConfig(action_latency=(0.0, 0.1)), dtype=np.float64)
-    start, _ = reset(env, random_key(0), 1)
-    actions = jnp.asarray(np.random.default_rng(0).uniform(-0.6, 0.4, (10, 1, 4)))
-
-    @jax.jit
-    def end(late: jax.Array) -> jax.Array:
-        state = dataclasses.replace(start, action_latency=late[None])
-        return jax.lax.scan(lambda s, a: (env.step(s, a, restart=False)[0], None), state, actions)[
-            0
-        ].vehicle.position.sum()
-
-    exact = jax.jit(jax.grad(end))(jnp.float64(0.047))
-    numeric = (end(jnp.float64(0.047 + 1e-6)) - end(jnp.float64(0.047 - 1e-6))) / 2e-6
-    np.testing.assert_allclose(exact, numeric, rtol=1e-5)
-    assert abs(exact) > 1e-3
+def test_wind_is_drawn_an_episode() -> None:
+    strength = np.linalg.norm(reset(make(wind=2.0), random_key(0), 500)[0].wind, axis=-1)
+    assert 1.9 < strength.max() <= 2 + 1e-5
 
 
 @pytest.mark.whole
@@ -233,52 +147,6 @@ def test_gradient_of_a_rollout_against_differences() -> None:
         step = jnp.zeros_like(actions).at[index].set(1e-6)
         numeric = (gain(actions + step) - gain(actions - step)) / 2e-6
         np.testing.assert_allclose(exact[index], numeric, rtol=1e-5, atol=1e-9)
-
-
-def test_changing_numbers_does_not_compile_again() -> None:
-    env = make(randomize={"mass": 0.1})
-    state, _ = reset(env, random_key(0), 4)
-    program = jax.jit(lambda env, state, action: env.step(state, action)[1].reward)
-    for change in (
-        {},
-        {"weights": {"prog2": 5.0, "anglev": 0.0}},
-        {"randomize": {"mass": 0.3}},
-        {"task": dataclasses.replace(env.task, config=HoverConfig(position=1.0, fence=9.0))},
-    ):
-        program(dataclasses.replace(env, **change), state, jnp.zeros((4, 4)))
-    assert program._cache_size() == 1
-
-
-def test_late_observations_show_the_past() -> None:
-    n, k, period = 3, 4, 0.1
-    ages = -period * np.arange(k, dtype=np.float32)
-    past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, k, *x.shape[1:])), at_rest(jnp.zeros((n, 3))))
-    past = dataclasses.replace(past, position=jnp.broadcast_to(2.0 * ages[:, None], (n, k, 3)))
-    seen = delayed_state(past, jnp.array([0.0, 0.05, 0.27]), period)
-    np.testing.assert_allclose(seen.position[:, 0], [0.0, -0.1, -0.54], atol=1e-6)
-
-
-def test_state_noise_has_its_size() -> None:
-    state = at_rest(jnp.zeros((20_000, 3)))
-    noisy = add_noise(NoiseConfig(0.1, 0.2, 0.05, 0.3), random_key(0), state)
-    np.testing.assert_allclose(np.std(noisy.position), 0.1, rtol=0.03)
-    np.testing.assert_allclose(np.std(noisy.velocity), 0.2, rtol=0.03)
-    np.testing.assert_allclose(np.std(2 * noisy.quaternion[:, 1:]), 0.05, rtol=0.03)
-    np.testing.assert_allclose(np.std(noisy.body_rate), 0.3, rtol=0.03)
-
-
-def test_imu_noise_and_bias_grow_as_their_densities_say() -> None:
-    config, n, dt, steps = ImuConfig(gyro_noise=0.01, gyro_bias=0.02, gyro_tau=4.0), 4000, 0.02, 50
-    still = at_rest(jnp.zeros((n, 3)))
-    keys = jax.random.split(random_key(0), steps)
-    end, seen = jax.lax.scan(
-        lambda s, key: (lambda m: (m, m.gyroscope - m.gyro_bias))(imu.measure(config, key, s, still, still, dt)),
-        imu.ImuState.at(still),
-        keys,
-    )
-    np.testing.assert_allclose(np.std(seen), 0.01 / np.sqrt(dt), rtol=0.02)
-    np.testing.assert_allclose(np.std(end.gyro_bias), 0.02 * np.sqrt(steps * dt / 4.0), rtol=0.05)
-    np.testing.assert_allclose(np.mean(end.accelerometer, axis=0), [0, 0, 9.81], atol=0.01)
 
 
 def test_a_run_and_what_is_flown_for_a_purpose_draw_from_different_keys() -> None:

@@ -23,19 +23,8 @@ from tests.learning.one_program import compile_once
 pytestmark = pytest.mark.usefixtures("quick")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "06_own_task.py"
-SMALL = [
-    "--preset",
-    "nominal",
-    "--steps",
-    "4096",
-    "--algo.envs",
-    "32",
-    "--algo.horizon",
-    "32",
-    "--eval-episodes",
-    "32",
-    "--no-plots",
-]
+SMALL = ["--preset", "nominal", "--steps", "4096", "--algo.envs", "32", "--algo.horizon", "32",
+         "--eval-episodes", "32", "--no-plots"]  # fmt: skip
 
 
 @pytest.fixture(autouse=True)

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.courses.references import KNOT_PERIOD, Lissajous, Spline, read_csv, through_points
+from e2efly.courses.references import KNOT_PERIOD, Lissajous, Spline, through_points
 from e2efly.environment import random_key
 from e2efly.tasks.track.splines import polynomial
 
@@ -97,8 +97,3 @@ def test_a_users_path_goes_through_points_closer_than_the_knots() -> None:
     table = np.stack([t, np.sin(np.pi * t), np.cos(np.pi * t), 0 * t + 2], -1)
     path = at(through_points(table), t)[0]
     assert np.linalg.norm(path - table[:, 1:], axis=-1).max() < 0.01
-
-
-def test_a_file_that_is_not_there() -> None:
-    with pytest.raises(ValueError, match=r"reference 'nowhere\.csv' cannot be read"):
-        read_csv("nowhere.csv")

@@ -3,13 +3,12 @@
 import dataclasses
 import subprocess
 import sys
-from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.courses.references import Lissajous, read_csv, through_points
+from e2efly.courses.references import Lissajous
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.environment import random_key
 from e2efly.simulation.physics.rotation import from_euler
@@ -18,8 +17,6 @@ from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.hover.world import Hover
 from e2efly.tasks.land import LandConfig
 from e2efly.tasks.land.world import Land
-from e2efly.tasks.race import RaceConfig
-from e2efly.tasks.race.world import Race
 from e2efly.tasks.task import Outcome, Shape, at_rest
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.splines import polynomial
@@ -29,89 +26,12 @@ SHAPE = Shape(0.05, 0.12)
 LATER, NOW = jnp.zeros(1, bool), jnp.ones(1, bool)
 
 
-def move(race: Race, memory: int, start: list[float], end: list[float]) -> tuple[int, Outcome]:
-    a, b = (at_rest(jnp.array([p])) for p in (start, end))
-    memory_after, out = race.advance(jnp.array([memory]), a, b, jnp.zeros(1), LATER)
-    return int(memory_after[0]), out
-
-
-def test_a_gate_is_passed_forward_through_its_opening() -> None:
-    race = Race.of(RaceConfig(), SHAPE)  # gate 1 at (4, 4, 1), flown through along x
-    after, out = move(race, 0, [3.9, 4.2, 1.1], [4.1, 4.2, 1.1])
-    assert (after, bool(out.arrived[0]), bool(out.terminated[0])) == (1, True, False)
-
-
-@pytest.mark.parametrize("y", [4.5, 6.0, -3.0])
-def test_crossing_the_plane_outside_the_opening_fails(y: float) -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    after, out = move(race, 0, [3.9, y, 1.1], [4.1, y, 1.1])
-    assert (after, bool(out.crashed[0]), bool(out.success[0])) == (0, True, False)
-
-
-def test_the_sphere_and_not_only_its_centre_must_fit() -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    assert not move(race, 0, [3.9, 4.37, 1.0], [4.1, 4.37, 1.0])[1].crashed[0]
-    assert move(race, 0, [3.9, 4.39, 1.0], [4.1, 4.39, 1.0])[1].crashed[0]
-
-
-def test_crossing_backward_neither_passes_nor_fails() -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    after, out = move(race, 0, [4.1, 6.0, 1.1], [3.9, 6.0, 1.1])
-    assert (after, bool(out.terminated[0])) == (0, False)
-
-
-def test_the_frame_of_any_gate_can_be_struck() -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    assert move(race, 2, [4.1, 4.55, 1.0], [3.9, 4.55, 1.0])[1].crashed[0]
-
-
-def test_gates_count_in_order_and_a_lap_ends_the_race() -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    assert move(race, 1, [3.9, 4.0, 1.0], [4.1, 4.0, 1.0])[0] == 1  # gate 1 again: gate 2 is next
-    track = load_track("four_gates")
-    c, yaw = track.position[3], track.yaw[3]
-    forward = 0.1 * np.array([np.cos(yaw), np.sin(yaw), 0])
-    after, out = move(race, 3, list(c - forward), list(c + forward))
-    assert (after, bool(out.success[0]), bool(out.terminated[0])) == (4, True, True)
-    endless = Race.of(RaceConfig(laps=0), SHAPE)
-    assert not move(endless, 3, list(c - forward), list(c + forward))[1].terminated[0]
-
-
-def test_the_ground_is_there() -> None:
-    race = Race.of(RaceConfig(), SHAPE)
-    assert move(race, 0, [0, 0, 0.1], [0, 0, 0.05])[1].crashed[0]
-
-
 @pytest.mark.parametrize("name", track_names())
 def test_shipped_tracks_meet_each_gate_from_behind(name: str) -> None:
     track = load_track(name)
     points = np.vstack([track.start, track.position])
     for before, gate, yaw in zip(points, track.position, track.yaw, strict=False):
         assert np.dot(gate - before, [np.cos(yaw), np.sin(yaw), 0]) > 0.5
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("closed = true", "closed = 1", "closed is 1; accepted: true or false"),
-        ("opening = [1.0, 1.0] },\n]", "opening = [0.2, 1.0] },\n]", r"gates\[3\].opening is \[0.2, 1.0\]"),
-        ("[4.0, 4.0, 1.0]", "[4.0, nan, 1.0]", r"gates\[0\].position is"),
-        ("[4.0, 4.0, 1.0]", "[4.0, 4.0, 0.2]", "an opening above the ground"),
-        ("yaw = 45.0", "yow = 45.0", "start has"),
-        ("closed = true", "closed =", "not a TOML file"),
-    ],
-)
-def test_broken_tracks_are_named(old: str, new: str, message: str, tmp_path: Path) -> None:
-    import e2efly.courses.tracks as tracks
-
-    text = (Path(tracks.__file__).parent / "four_gates.toml").read_text()
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
-    assert load_track(str(path)).name == "mine"
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-    with pytest.raises(ValueError, match=message):
-        load_track(str(path))
 
 
 def land(position: list[float], velocity: list[float], tilt: float) -> Outcome:
@@ -170,19 +90,6 @@ def test_tracking_is_judged_by_the_mean_error_after_it_settled() -> None:
         assert bool(task.advance(memory, state, state, t, NOW)[1].success[0]) == success
 
 
-@pytest.mark.parametrize(
-    ("curve", "bound"), [(Lissajous.circle(2.0, 0.2 * np.pi), 1e-5), (Lissajous.lemniscate(2.0, 3.0), 1e-4)]
-)
-def test_splines_are_the_curves(curve: Lissajous, bound: float) -> None:
-    phase = jnp.array([0.3])
-    t = jnp.linspace(0, 9.9, 500)[None]
-    spline = curve.spline((0.0, 0.0, 3.0), phase, 23)
-    angle = curve.rate * t[0] + phase
-    x, y = curve.half_x * jnp.sin(angle + curve.shift), curve.half_y * jnp.sin(curve.ratio * angle)
-    error = np.linalg.norm(np.asarray(spline.position(t)[0, :, :2]) - np.stack([x, y], -1), axis=-1)
-    assert error.max() < bound
-
-
 def test_the_lemniscate_reaches_its_speed() -> None:
     t = jnp.linspace(0, 8, 8001)[None]
     p = np.asarray(Lissajous.lemniscate(2.0, 3.0).spline((0.0, 0.0, 3.0), jnp.zeros(1), 23).position(t)[0], np.float64)
@@ -198,34 +105,6 @@ def test_random_polynomials_are_smooth_and_stay_in_their_box() -> None:
     assert 2.0 < np.linalg.norm(velocity, axis=-1).max() < 6.0
     acceleration = np.diff(velocity, axis=1) / (10.9 / 1999)
     assert np.abs(acceleration).max() < 20  # no jumps of the velocity
-
-
-def test_a_users_reference_goes_through_its_points(tmp_path: Path) -> None:
-    path = tmp_path / "mine.csv"
-    t = np.arange(0, 12, 0.5)
-    path.write_text("t,x,y,z\n" + "\n".join(f"{a + 3},{np.sin(a)},{np.cos(a)},2" for a in t))
-    spline = through_points(read_csv(path))
-    np.testing.assert_allclose(spline.position(jnp.array([[2.5]]))[0, 0], [np.sin(2.5), np.cos(2.5), 2], atol=1e-5)
-    assert Track.of(TrackConfig(reference=str(path)), SHAPE).curve is not None
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "line 1: empty"),
-        ("time,x,y,z\n", "line 1"),
-        ("t,x,y,z\n0,0,0,1\n1,0,0,1\n", "2 rows"),
-        ("t,x,y,z\n0,0,0,1\n0,0,0,1\n2,0,0,1\n", "line 3"),
-        ("t,x,y,z\n0,0,0,1\n1,nan,0,1\n2,0,0,1\n", "line 3"),
-        ("t,x,y,z\n0,0,0,1\n1,0,1\n2,0,0,1\n", "line 3"),
-        ("t,x,y,z\n0,0,0,0\n1,0,0,1\n2,0,0,1\n", "lowest z is 0.0 m"),
-    ],
-)
-def test_broken_references_are_named(text: str, message: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.csv"
-    path.write_text(text)
-    with pytest.raises(ValueError, match=message):
-        Track.of(TrackConfig(reference=str(path)), SHAPE)
 
 
 @pytest.mark.whole(but=1)

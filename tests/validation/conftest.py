@@ -18,6 +18,7 @@ from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.runs import presets
 from e2efly.validation.plants import PLANTS
 from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.loading import load_vehicle, vehicle_file
 
 POSITION, VELOCITY, ATTITUDE = 2.0, 2.4, 6.0
 """Gains: 1/s^2, 1/s, 1/s."""
@@ -33,6 +34,15 @@ def _own_files_are_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     for name in [name for name in sys.modules if name.startswith(own)]:
         del sys.modules[name]
+
+
+@pytest.fixture
+def heavy(tmp_path: Path) -> str:
+    """The file of a VIS-R with 20 % more mass."""
+    vehicle, file = vehicle_file("vis_r").read_text(), tmp_path / "heavy.toml"
+    file.write_text(vehicle.replace("value = 0.75\n", "value = 0.9\n", 1))
+    assert load_vehicle(file).mass == 0.9
+    return str(file)
 
 
 def controller(env: Env, sink: float = 0.0) -> Layers:

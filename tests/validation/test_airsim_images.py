@@ -261,10 +261,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"width": 0}, r"ImageResponse.width is 0; accepted: 1 to 4096 pixels"),
     ({"height": None}, r"ImageResponse.height is None; accepted: 1 to 4096 pixels"),
     ({"image_data_uint8": b""}, r"ImageResponse.image_data_uint8 is 0 bytes; accepted: 768 bytes"),
-    (
-        {"width": 0, "height": 0, "message": "camera is not set"},
-        r"ImageResponse.message is camera is not set; accepted",
-    ),
+    ({"width": 0, "height": 0, "message": "not set"}, r"ImageResponse.message is not set; accepted"),
     ({"image_type": 0}, r"ImageResponse.image_type is 0; accepted: 5"),
     ({"camera_position": {"x_val": 1.0}}, r"ImageResponse.camera_position.y_val is None; accepted: a finite number"),
     (
@@ -351,11 +348,7 @@ def test_a_camera_that_is_not_the_contracts_is_named(
 @pytest.mark.parametrize(
     ("where", "changes", "told"),
     [
-        (
-            "down",
-            {},
-            r"which colour of AirSim's segmentation is 'pad' no AirSim says; accepted: plant:CAMERA, for a mask",
-        ),
+        ("down", {}, r"which colour of AirSim's segmentation is 'pad' no AirSim says; accepted: plant:CAMERA"),
         ("down:1,2", {}, r"'plant:down:1,2'; accepted: plant:CAMERA.*each 0 to 255"),
         ("down:1,2,256", {}, r"accepted: plant:CAMERA.*each 0 to 255"),
         ("down:1,2,x", {}, r"accepted: plant:CAMERA.*each 0 to 255"),
@@ -375,10 +368,7 @@ def test_what_airsim_cannot_show_is_named_before_it_is_asked(
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (
-            ["--image", "image_0=plant:down"],
-            "accepted on plant 'simulator', which has no cameras of its own: no --image",
-        ),
+        (["--image", "image_0=plant:down"], "accepted on plant 'simulator', which has no cameras of its own"),
         (["--image", "image_0=shm:front"], "--image image_0 is 'shm:front'; accepted: image_0=plant:CAMERA"),
         (["--image", "image_7=plant:down"], "--image is 'image_7=plant:down'; accepted: NAME=URI, NAME one of image_0"),
         (["--stress", "--image", "image_0=plant:down"], "--image is 'image_0=plant:down'; accepted without --stress"),

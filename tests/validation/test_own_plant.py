@@ -9,7 +9,7 @@ import pytest
 import e2efly
 from e2efly.commands.cli import run
 from e2efly.config.registry import load
-from e2efly.validation.plants import PLANTS, find_plant
+from e2efly.validation.plants import find_plant
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"
 WHOLE = """
@@ -23,12 +23,6 @@ class Mine(e2efly.Plant):
     @property
     def state(self): ...
 """
-
-
-@pytest.fixture(autouse=True)
-def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a test registers goes with it."""
-    monkeypatch.setattr(PLANTS, "_known", dict(PLANTS._known))
 
 
 @pytest.mark.whole

@@ -18,7 +18,7 @@ from e2efly.simulation.scenes.camera import mount
 from e2efly.simulation.sensors.eyes import Eye
 from e2efly.tasks import TASKS
 from e2efly.validation.stress import stress
-from e2efly.vehicles.loading import load_vehicle, vehicle_file
+from e2efly.vehicles.loading import load_vehicle
 
 VIS_R = load_vehicle("vis_r")
 N = 4000
@@ -182,14 +182,12 @@ def forgetful(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.whole
 @pytest.mark.parametrize("controller", ["policy", "plant"])
-def test_the_rows_change_the_vehicle_that_flies(controller: str, tmp_path: Path, forgetful: Path) -> None:
+def test_the_rows_change_the_vehicle_that_flies(controller: str, heavy: str, forgetful: Path) -> None:
     """The nominal row is what `evaluate` flies of another vehicle; the mass of a row is about that vehicle's."""
-    heavy = tmp_path / "heavy.toml"
-    heavy.write_text(vehicle_file("vis_r").read_text().replace("value = 0.75\n", "value = 0.9\n", 1))
-    flies = {"vehicle": str(heavy), "controller": controller}
+    flies = {"vehicle": heavy, "controller": controller}
     plain = e2efly.evaluate(forgetful, 20, **flies)  # type: ignore[arg-type]
     report = stress(forgetful, 20, rows=("nominal", "mass x0.8"), **flies)  # type: ignore[arg-type]
-    assert (report.as_json()["vehicle"], report.as_json()["controller"]) == (str(heavy), controller)
+    assert (report.as_json()["vehicle"], report.as_json()["controller"]) == (heavy, controller)
     a, b, light = (
         float(np.median(found["hover"].final_error))
         for found in (plain.flown, report.flown["nominal"], report.flown["mass x0.8"])

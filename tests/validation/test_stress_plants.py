@@ -12,7 +12,7 @@ from e2efly.commands.cli import run
 from e2efly.environment.stress_rows import ALL, ROWS, rows_for
 from e2efly.validation.plant import EVERYTHING, Plant
 from e2efly.validation.plant_stress import lacking, realities, stress
-from e2efly.validation.plants import PLANTS, find_plant
+from e2efly.validation.plants import find_plant
 from e2efly.validation.stress import Report, draws
 from e2efly.validation.stress import stress as in_training
 from e2efly.vehicles.loading import load_vehicle
@@ -90,9 +90,8 @@ def test_every_row_says_what_it_changes_and_plants_what_they_can() -> None:
 
 
 def test_the_command_reports_names_what_is_left_out_and_judges(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(PLANTS, "_known", dict(PLANTS._known))
     report = tmp_path / "report.json"
     asked = ["validate", "hover", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "2", "--out"]
     assert run([*asked, str(tmp_path), "--json", str(report), "--least", "0.5"]) == 0

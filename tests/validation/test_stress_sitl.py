@@ -9,7 +9,6 @@ import pytest
 import e2efly
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.stress import stress as in_training
-from e2efly.vehicles.loading import vehicle_file
 
 ROWS = ("nominal", "mass x1.25", "thrust falls by 15 %", "wind 3 m/s", "delay +20 ms", "motor lag x2")
 CLOSE = 0.12
@@ -33,12 +32,10 @@ def test_the_firmware_meets_the_rows(policy_of: Callable[..., Path]) -> None:
 @pytest.mark.whole
 @pytest.mark.parametrize(("controller", "low", "high"), [("policy", 0.8, 1.1), ("plant", -0.1, 0.1)])
 def test_the_throttle_map_is_of_the_vehicle_that_the_controller_believes_in(
-    controller: str, low: float, high: float, policy_of: Callable[..., Path], tmp_path: Path
+    controller: str, low: float, high: float, policy_of: Callable[..., Path], heavy: str
 ) -> None:
     """20 % more mass: this controller's gain is 2 m/s^2 per m."""
-    heavy = tmp_path / "heavy.toml"
-    heavy.write_text(vehicle_file("vis_r").read_text().replace("value = 0.75\n", "value = 0.9\n", 1))
-    found = e2efly.validate(policy_of("hover"), "betaflight", 2, vehicle=str(heavy), controller=controller)  # type: ignore[arg-type]
+    found = e2efly.validate(policy_of("hover"), "betaflight", 2, vehicle=heavy, controller=controller)  # type: ignore[arg-type]
     flown = found.criteria["hover"]
     deeper = flown.flown.final_error - flown.trained.final_error
     assert np.all((low < deeper) & (deeper < high)), deeper

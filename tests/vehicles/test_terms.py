@@ -55,27 +55,12 @@ def test_a_term_in_a_file(name: str, written: Callable[..., Path]) -> None:
 
 BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "negative rotor inertia": ({"rotor_inertia": -1e-6}, r"rotor_inertia.value is -1e-06; accepted: >= 0 kg\*m\^2"),
-    "centre of mass outside": (
-        {"centre_of_mass": [0.06, 0.0, 0.0]},
-        r"centre_of_mass.value is \[0.06, 0.0, 0.0\]: to hover level .*accepted: a pl",
-    ),
-    "flat centre of mass": (
-        {"centre_of_mass": [0.01, 0.0]},
-        r"centre_of_mass.value is .*accepted: numbers of shape \(3,",
-    ),
-    "no principal moment": (
-        {"inertia_products": [2e-3, 0.0, 0.0]},
-        r"inertia_products.value is .*accepted: a tensor of which every principal",
-    ),
-    "no rigid body": (
-        {"inertia_products": [1.2e-3, 0.0, 0.0]},
-        r"inertia.value is .* with products .*accepted: no principal moment larger",
-    ),
+    "centre of mass outside": ({"centre_of_mass": [0.06, 0.0, 0.0]}, r"centre_of_mass.value is .*0.06.*accepted: a pl"),
+    "flat centre of mass": ({"centre_of_mass": [0.01, 0.0]}, r"centre_of_mass.value is .*accepted: numbers of shape"),
+    "no principal moment": ({"inertia_products": [2e-3, 0, 0]}, "inertia_products.value is .*accepted: a tensor of"),
+    "no rigid body": ({"inertia_products": [1.2e-3, 0, 0]}, "inertia.value is .* with products .*accepted: no princi"),
     "drag torque that drives": ({"drag_torque": [-1e-3, 0.0, 0.0]}, r"drag_torque.value is .*accepted: >= 0 N\*m\*s"),
-    "an integral that drives": (
-        {"rate_integral_gain": [-1.0, 0.0, 0.0]},
-        r"rate_integral_gain.value is .*accepted: >= 0 ",
-    ),
+    "an integral that drives": ({"rate_integral_gain": [-1.0, 0, 0]}, "rate_integral_gain.value is .*accepted: >= 0 "),
     "no filter": ({"gyro_time_constant": 0.0}, r"gyro_time_constant.value is 0.0; accepted: > 0 s"),
     "a battery without a nominal voltage": (
         {"battery_voltage": 15.0, "voltage_sag": 0.1},

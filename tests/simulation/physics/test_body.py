@@ -35,12 +35,6 @@ def test_drag_takes_energy_in_every_direction(vis_r: Vehicle) -> None:
         assert np.all(f * u < 0)
 
 
-def test_drag_by_hand(vis_r: Vehicle) -> None:
-    force = body.drag(plant(vis_r), Vec3.of(jnp.asarray([2.0, -3.0, -1.0]))).stack()
-    expected = [-(0.005 * 2 + 0.0030625 * 4), 0.005 * 3 + 0.0030625 * 9, 0.00575 + 0.0091875]
-    np.testing.assert_allclose(force, expected, rtol=1e-12)
-
-
 def test_gyroscopic_torque_does_no_work(vis_r: Vehicle) -> None:
     rate = Vec3.of(jnp.asarray(draws(1, 3, 10.0)))
     zero = jnp.zeros_like(rate.x)
@@ -71,19 +65,6 @@ def test_thrust_map_and_its_inverse(vis_r: Vehicle) -> None:
     np.testing.assert_allclose(thrust[2], [vis_r.rotor_thrust(float(s)) for s in speed], rtol=1e-12)
     np.testing.assert_allclose(body.rotor_speed_for(vis_r, thrust)[1], speed, rtol=1e-12)
     assert np.all(np.asarray(body.rotor_thrust(plant(vis_r), (jnp.linspace(0.0, 224.0, 9),) * 4)) == 0)
-
-
-@pytest.mark.parametrize("name", ["vis_r", "vis_h", "crazyflie"])
-def test_hover_is_an_equilibrium(name: str) -> None:
-    vehicle = load_vehicle(name)
-    state = State.hovering(vehicle, jnp.zeros(3))
-    assert float(body.hover_rotor_speed(vehicle)) == pytest.approx(vehicle.hover_rotor_speed, rel=1e-12)
-    collective, torque = body.rotor_wrench(plant(vehicle), body.rotor_thrust(plant(vehicle), split4(state.rotor_speed)))
-    attitude = Quat.of(state.quaternion)
-    force = body.drag(plant(vehicle), body.air_velocity(attitude, Vec3.of(state.velocity), None))
-    a = body.acceleration(plant(vehicle), attitude, force, collective)
-    np.testing.assert_allclose(a.stack(), 0, atol=1e-12)
-    np.testing.assert_allclose(torque.stack(), 0, atol=1e-14)
 
 
 def test_acceleration_by_hand(vis_r: Vehicle, random_state: Callable[..., State]) -> None:

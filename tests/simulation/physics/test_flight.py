@@ -11,7 +11,7 @@ import pytest
 from e2efly.control import COMMAND_MODES
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, rotation
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.body import rotor_thrust
+from e2efly.simulation.physics.body import hover_rotor_speed, rotor_thrust
 from e2efly.simulation.physics.state import split4
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
@@ -35,11 +35,12 @@ def at_rest(vehicle: Vehicle) -> State:
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("name", ["vis_r", "vis_h"])
+@pytest.mark.parametrize("name", ["vis_r", "vis_h", "crazyflie"])
 def test_hover_stays(name: str, integrator: str, fly: Callable[..., State]) -> None:
     vehicle = load_vehicle(name)
     end = fly(physics_of(vehicle, integrator=integrator), vehicle, at_rest(vehicle), hover_thrusts(vehicle, 60))
     start = at_rest(vehicle)
+    assert float(hover_rotor_speed(vehicle)) == pytest.approx(vehicle.hover_rotor_speed, rel=1e-12)
     for part in ("position", "velocity", "quaternion", "body_rate", "rotor_speed"):
         np.testing.assert_allclose(
             getattr(end, part)[-1], getattr(start, part), atol=1e-10, err_msg=f"{part} under {integrator}"
@@ -89,16 +90,6 @@ def test_motor_lag_is_exact_for_any_substep(
         np.testing.assert_allclose(path.rotor_speed, expected, rtol=1e-12)
 
 
-def test_motor_lag_in_a_control_step(vis_r: Vehicle, fly: Callable[..., State]) -> None:
-    physics, command = physics_of(vis_r), jnp.asarray([0.5, 1.0, 3.0, 5.0])
-    path = fly(physics, vis_r, at_rest(vis_r), jnp.broadcast_to(command, (60, 4)))
-    k2, k1, k0 = vis_r.thrust_map
-    wanted = (-k1 + np.sqrt(k1**2 + 4 * k2 * (np.asarray(command) - k0))) / (2 * k2)
-    t = np.arange(1, 61)[:, None] / 30
-    expected = wanted + (vis_r.hover_rotor_speed - wanted) * np.exp(-t / vis_r.motor_time_constant)
-    np.testing.assert_allclose(path.rotor_speed, expected, rtol=1e-12)
-
-
 def test_terminal_velocity(vis_r: Vehicle, stone: Vehicle, fly: Callable[..., State]) -> None:
     plant = dataclasses.replace(stone, drag_linear=vis_r.drag_linear, drag_quadratic=vis_r.drag_quadratic)
     physics = physics_of(vis_r, integrator="rk4", control_rate=7.5, largest_step=1 / 30)
@@ -128,13 +119,13 @@ def test_wind_is_a_moving_frame(
 
 
 COMMANDS = {
-    "rotor_thrust": (1.9, 1.7, 2.0, 1.8),
-    "rotor_share": (0.37, 0.33, 0.39, 0.35),
-    "ctbr": (11.0, 1.0, -2.0, 0.7),
-    "attitude": (10.0, 0.3, -0.2, 0.5),
-    "acceleration": (1.0, -2.0, 0.5, 0.6),
-    "velocity": (1.0, 0.5, -0.3, -0.4),
-    "position": (0.5, 0.4, -0.2, 0.3),
+    "rotor_thrust": [1.9, 1.7, 2.0, 1.8],
+    "rotor_share": [0.37, 0.33, 0.39, 0.35],
+    "ctbr": [11.0, 1.0, -2.0, 0.7],
+    "attitude": [10.0, 0.3, -0.2, 0.5],
+    "acceleration": [1.0, -2.0, 0.5, 0.6],
+    "velocity": [1.0, 0.5, -0.3, -0.4],
+    "position": [0.5, 0.4, -0.2, 0.3],
 }
 
 
@@ -162,12 +153,7 @@ def test_mirrored_flight(mode: str, vis_r: Vehicle, gentle: State, fly: Callable
         )  # fmt: skip
 
     physics, command = physics_of(vis_r, mode), np.array(COMMANDS[mode])
-    mirrored = {
-        "rotor_thrust": command[[2, 3, 0, 1]],
-        "rotor_share": command[[2, 3, 0, 1]],
-        "ctbr": command * [1, -1, 1, -1],
-        "attitude": command * [1, -1, 1, -1],
-    }.get(mode, command * [1, -1, 1, -1])
+    mirrored = command[[2, 3, 0, 1]] if mode.startswith("rotor") else command * [1, -1, 1, -1]
     path = fly(physics, vis_r, gentle, jnp.broadcast_to(command, (15, 4)))
     other = fly(physics, vis_r, mirror(gentle), jnp.broadcast_to(mirrored, (15, 4)))
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-9), mirror(path), other)
@@ -189,12 +175,8 @@ def test_no_compass_direction_is_special(mode: str, vis_r: Vehicle, gentle: Stat
 
     physics, command = physics_of(vis_r, mode), jnp.asarray(COMMANDS[mode])
     level = jnp.append(rotation.rotate(turn, command[:3]), command[3] + angle)
-    other = {
-        "rotor_thrust": command,
-        "rotor_share": command,
-        "ctbr": command,
-        "attitude": command.at[3].add(angle),
-    }.get(mode, level)
+    in_body = mode.startswith("rotor") or mode == "ctbr"
+    other = command if in_body else command.at[3].add(angle) if mode == "attitude" else level
     path = fly(physics, vis_r, gentle, jnp.broadcast_to(command, (15, 4)))
     expected = fly(physics, vis_r, turned(gentle), jnp.broadcast_to(other, (15, 4)))
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-9), turned(path), expected)

@@ -78,20 +78,6 @@ def errors(golden: Golden, fly_open_loop: Callable[..., State]) -> Errors:
     return largest
 
 
-def test_the_shipped_vehicles_are_those_of_the_reference(golden: Golden) -> None:
-    model, rotors = golden.model["model"], golden.model["rotors"]
-    for name, values in model["vehicles"].items():
-        vehicle = load_vehicle(name)
-        assert vehicle.mass == values["mass"]
-        np.testing.assert_array_equal(vehicle.inertia, values["inertia"])
-        np.testing.assert_array_equal(vehicle.thrust_map, model["thrust_map"])
-        np.testing.assert_array_equal(vehicle.drag_linear, model["drag_linear"])
-        np.testing.assert_array_equal(vehicle.drag_quadratic, model["drag_quadratic"])
-        np.testing.assert_allclose(vehicle.rotor_position, rotors["xy"], rtol=1e-15)
-        np.testing.assert_array_equal(vehicle.rotor_spin, rotors["yaw_reaction"])
-        assert (vehicle.torque_ratio, vehicle.motor_time_constant) == (rotors["kappa_m"], model["tau_s"])
-
-
 def test_runge_kutta_converges_to_the_reference(golden: Golden, errors: Errors) -> None:
     assert golden.commands.shape == (60, 6, 4)
     coarse, fine, finest = (errors("rk4", n) for n in (2, 4, 32))

@@ -14,6 +14,7 @@ from e2efly.control import COMMAND_MODES
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, rotation, step
 from e2efly.vehicles.vehicle import Vehicle
 from tests.gradients import central, reverse
+from tests.simulation.physics.test_flight import COMMANDS
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -33,15 +34,6 @@ HOVER = {
     "rotor_thrust": [0.75 * 9.81 / 4] * 4, "rotor_share": [0.75 * 9.81 / 4 / 5.12] * 4, "ctbr": [9.81, 0, 0, 0],
     "attitude": [9.81, 0, 0, 0],
 }  # fmt: skip
-COMMANDS = {
-    "rotor_thrust": [1.9, 1.7, 2.0, 1.8],
-    "rotor_share": [0.37, 0.33, 0.39, 0.35],
-    "ctbr": [11.0, 1.0, -2.0, 0.7],
-    "attitude": [10.0, 0.3, -0.2, 0.5],
-    "acceleration": [1.0, -2.0, 0.5, 0.6],
-    "velocity": [1.0, 0.5, -0.3, -0.4],
-    "position": [0.5, 0.4, -0.2, 0.3],
-}
 EXTREME = {
     "rotor_thrust": [9.0, -1.0, 9.0, 8.0],
     "rotor_share": [1.8, -0.2, 1.8, 1.6],

@@ -53,14 +53,10 @@ def test_attitude_goes_before_thrust(name: str) -> None:
     vehicle = load_vehicle(name)
     low, high = vehicle.thrust_range
     _, wrench = wrenches(vehicle, 2, 0.0, 1.0)
-    asked = wrench + np.array([4 * high, 0, 0, 0])
-    realised = mix(vehicle, asked) @ allocation_matrix(vehicle).T
-    np.testing.assert_allclose(realised[:, 1:], wrench[:, 1:], atol=1e-12)
-    np.testing.assert_allclose(mix(vehicle, asked).max(-1), high, rtol=1e-12)
-    asked = wrench - np.array([4 * high, 0, 0, 0])
-    realised = mix(vehicle, asked) @ allocation_matrix(vehicle).T
-    np.testing.assert_allclose(realised[:, 1:], wrench[:, 1:], atol=1e-12)
-    np.testing.assert_allclose(mix(vehicle, asked).min(-1), low, rtol=1e-12)
+    for more, bound, nearest in ((4 * high, high, np.max), (-4 * high, low, np.min)):
+        thrusts = mix(vehicle, wrench + np.array([more, 0, 0, 0]))
+        np.testing.assert_allclose((thrusts @ allocation_matrix(vehicle).T)[:, 1:], wrench[:, 1:], atol=1e-12)
+        np.testing.assert_allclose(nearest(thrusts, -1), bound, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", NAMES)

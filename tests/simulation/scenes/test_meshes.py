@@ -158,10 +158,7 @@ class TestScene:
             ({"faces": np.array([[0, 1, 8]])}, "object 'thing': faces name vertices that are not there.*3 of 8"),
             ({"texture": np.zeros((2, 2, 3), np.uint8)}, "object 'thing': has a texture, but no texture coordinates"),
             ({"uv": np.full((8, 2), np.inf)}, "object 'thing': texture coordinates are not all finite"),
-            (
-                {"vertices": np.full((8, 3), 1e39)},
-                "object 'thing': vertices are not all finite .*at most 10000",
-            ),
+            ({"vertices": np.full((8, 3), 1e39)}, "object 'thing': vertices are not .* finite .*at most 10000"),
             ({"uv": np.full((8, 2), 1e308)}, "object 'thing': texture coordinates .*at most 10000 in size"),
             ({"colour": np.full(3, np.inf)}, "object 'thing': colours have shape"),
             ({"colour": np.ones((1, 3))}, r"object 'thing': colours have shape \(1, 3\).*accepted: 3 numbers in"),
@@ -220,6 +217,15 @@ def obj_files(folder: Path) -> Path:
     return folder / "things.obj"
 
 
+def gltf_files(folder: Path, **changes: Any) -> Path:
+    """The two objects as text and a file for each buffer, with changes of the header."""
+    for name, raw in trimesh.exchange.gltf.export_gltf(glb_scene()).items():
+        (folder / name).write_bytes(raw)
+    path = folder / "model.gltf"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    return path
+
+
 class TestLoad:
     def test_glb(self, tmp_path: Path) -> None:
         glb_scene().export(tmp_path / "scene.glb")
@@ -234,16 +240,14 @@ class TestLoad:
         np.testing.assert_allclose(raw.reshape(-1, 3).max(axis=0), [0.005, 0.02, -0.035], atol=1e-6)
 
     def test_a_gltf_mesh_of_two_materials_is_one_object(self, tmp_path: Path) -> None:
-        files = trimesh.exchange.gltf.export_gltf(glb_scene())
-        header = json.loads(files["model.gltf"])
+        path = gltf_files(tmp_path)
+        header = json.loads(path.read_text())
         header["meshes"][0]["primitives"] += header["meshes"].pop()["primitives"]
         for node in header["nodes"]:
             if node.get("mesh") == 1:
                 del node["mesh"]
-        for name, raw in files.items():
-            (tmp_path / name).write_bytes(raw)
-        (tmp_path / "model.gltf").write_text(json.dumps(header))
-        scene = load_mesh_scene(tmp_path / "model.gltf")
+        path.write_text(json.dumps(header))
+        scene = load_mesh_scene(path)
         assert scene.names == ("sky", "ground") and len(scene.triangles) == 24
 
     def test_obj(self, tmp_path: Path) -> None:
@@ -282,12 +286,7 @@ class TestLoad:
         np.testing.assert_allclose(plain.colour, np.repeat(COLOURS[plain.label][:, None], 3, axis=1))
 
     def test_a_gltf_and_a_ply_whose_textures_were_not_sent_along(self, tmp_path: Path) -> None:
-        files = trimesh.exchange.gltf.export_gltf(glb_scene())
-        header = json.loads(files["model.gltf"])
-        for name, raw in files.items():
-            (tmp_path / name).write_bytes(raw)
-        required = {"images": [{"uri": "grass.png"}], "extensionsRequired": ["KHR_texture_basisu"]}
-        (tmp_path / "model.gltf").write_text(json.dumps(header | required))
+        gltf_files(tmp_path, images=[{"uri": "grass.png"}], extensionsRequired=["KHR_texture_basisu"])
         trimesh.creation.box().export(tmp_path / "wall.ply", encoding="ascii")
         text = (tmp_path / "wall.ply").read_text()
         (tmp_path / "wall.ply").write_text(text.replace("element", "comment TextureFile wall.png\nelement", 1))
@@ -309,6 +308,7 @@ class TestLoad:
             ("usemtl red\nf 1 2 3", "usemtl rod\nf 1 2 3", r"material 'rod' is missing; accepted: \['leaf', 'red'\]"),
             ("f 1 2 5", "f 1 2 9", r"things.obj: not a readable .obj file"),
             ("v 0 1 0", "v 0 nan 0", r"things.obj: object 'gate_one': vertices are not all finite"),
+            ("v 0 1 0", "v 0 1e39 0", r"things.obj: object 'gate_one': vertices are not all finite"),
         ],
     )  # fmt: skip
     def test_what_is_wrong_in_an_obj_is_named(self, tmp_path: Path, before: str, after: str, told: str) -> None:
@@ -319,26 +319,17 @@ class TestLoad:
             load_mesh_scene(path)
 
     def test_what_is_wrong_in_others_is_named(self, tmp_path: Path) -> None:
-        files = trimesh.exchange.gltf.export_gltf(glb_scene())
-        header = json.loads(files["model.gltf"])
-        for name, raw in files.items():
-            (tmp_path / name).write_bytes(raw)
-        (tmp_path / "model.gltf").write_text(json.dumps(header | {"images": [{"uri": "grass.png"}]}))
-        texture().save(tmp_path / "grass.png")
-        assert len(load_mesh_scene(tmp_path / "model.gltf").textures) == 2
-        (tmp_path / "grass.png").write_bytes(b"no image")
-        with pytest.raises(
-            ValueError, match=r"model.gltf: object 'ground': the texture of material 'grass' cannot be re"
-        ):
-            load_mesh_scene(tmp_path / "model.gltf")
-        (tmp_path / "grass.png").unlink()
+        path, image = gltf_files(tmp_path, images=[{"uri": "grass.png"}]), tmp_path / "grass.png"
+        texture().save(image)
+        assert len(load_mesh_scene(path).textures) == 2
+        image.write_bytes(b"no image")
+        with pytest.raises(ValueError, match=r"model.gltf: object 'ground': the texture of .* 'grass' cannot be read"):
+            load_mesh_scene(path)
+        image.unlink()
         with pytest.raises(ValueError, match=r"model.gltf: the image 'grass.png' is missing; accepted: a file in"):
-            load_mesh_scene(tmp_path / "model.gltf")
-        (tmp_path / "model.gltf").write_text(
-            json.dumps(header | {"extensionsRequired": ["KHR_draco_mesh_compression"]})
-        )
+            load_mesh_scene(path)
         with pytest.raises(ValueError, match=r"model.gltf: requires KHR_draco_mesh_compression; accepted"):
-            load_mesh_scene(tmp_path / "model.gltf")
+            load_mesh_scene(gltf_files(tmp_path, extensionsRequired=["KHR_draco_mesh_compression"]))
         (tmp_path / "bad.glb").write_bytes(b"bad")
         with pytest.raises(ValueError, match=r"bad.glb: not a .glb file"):
             load_mesh_scene(tmp_path / "bad.glb")
@@ -359,17 +350,11 @@ class TestLoad:
             ({"meshes": 3}, "meshes is 3; accepted: a list"),
             ({"meshes": [None]}, r"meshes\[0\] is None; accepted: an object"),
             ({"meshes": [{"primitives": {}}]}, r"meshes\[0\].primitives is \{\}; accepted: a list"),
-            (
-                {"meshes": [{"primitives": [{"mode": [4]}]}]},
-                r"meshes\[0\].primitives\[0\].mode is \[4\]; acc",
-            ),
+            ({"meshes": [{"primitives": [{"mode": [4]}]}]}, r"meshes\[0\].primitives\[0\].mode is \[4\]; acc"),
             ({"images": [{"uri": 5}]}, r"images\[0\].uri is 5; accepted: a text"),
             ({"buffers": ["a"]}, r"buffers\[0\] is 'a'; accepted: an object"),
             ({"materials": [{"name": ["a"]}]}, r"materials\[0\].name is \['a'\]; accepted: a text"),
-            (
-                {"materials": [{"pbrMetallicRoughness": 1}]},
-                r"materials\[0\].pbrMetallicRoughness is 1; accepted: ",
-            ),
+            ({"materials": [{"pbrMetallicRoughness": 1}]}, r"materials\[0\].pbrMetallicRoughness is 1; accepted: "),
             ({"extensionsRequired": [None]}, r"extensionsRequired\[0\] is None; accepted: a text"),
         ],
     )
@@ -383,11 +368,6 @@ class TestLoad:
         (tmp_path / "model.gltf").write_text(text)
         with pytest.raises(ValueError, match=r"model.gltf: not a .gltf file: "):
             load_mesh_scene(tmp_path / "model.gltf")
-
-    def test_numbers_that_overflow_are_told(self, tmp_path: Path) -> None:
-        (tmp_path / "far.obj").write_text("o hall\nv 0 0 0\nv 1e39 0 0\nv 0 1 0\nf 1 2 3\n")
-        with pytest.raises(ValueError, match=r"far.obj: object 'hall': vertices are not all finite"):
-            load_mesh_scene(tmp_path / "far.obj")
 
     def test_distances_without_the_extra_name_the_package(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """What `e2efly render garage` asks for first."""

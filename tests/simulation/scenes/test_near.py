@@ -1,21 +1,14 @@
 """How near a path comes to triangles: exact, through sheets, and never because of the floor that it starts from."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 
 from e2efly.simulation.scenes.meshes.mesh_scene import MeshPart, MeshScene
 from e2efly.simulation.scenes.meshes.near import Near
 from e2efly.simulation.scenes.scene import GATE, PAD
-
-
-def box(size: Any, centre: Any, name: str = "thing", **about: Any) -> MeshPart:
-    mesh = trimesh.creation.box(size)
-    mesh.apply_translation(centre)
-    return MeshPart(name, np.asarray(mesh.vertices), np.asarray(mesh.faces), **about)
+from tests.simulation.scenes.test_meshes import box
 
 
 def sheet(size: float, name: str = "scan", height: float = 0.0) -> MeshPart:
