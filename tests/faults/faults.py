@@ -126,7 +126,6 @@ def _drift(stage: Stage) -> None:
 def _led_astray(stage: Stage) -> bool:
     """Nothing is to be seen of a wrong heading before it leads the vehicle to the wrong side, and it moves by it."""
     odometry, true = stage.session.bridge.odometry, stage.rig.state
-    assert odometry is not None
     error = math.remainder(yaw_of(odometry.quaternion) - yaw_of(true.quaternion), math.tau)
     return abs(error) > math.pi / 2 and float(np.linalg.norm(true.velocity[:2])) > ASTRAY
 

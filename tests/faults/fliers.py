@@ -95,7 +95,6 @@ def _found(task: str) -> tuple[Candidate, Env]:
 def _by_sight(task: str, seed: int, rig: Rig, vehicle: Vehicle, gear: Gear) -> Outfit:
     found, env = _found(task)
     scenery = Scenery.draw(env, seed)
-    assert scenery is not None
     course = scenery.on(whole_course(found.policy, vehicle))
     x, y, z = course.origin.points(course.start)
     rig.state = rig.world.at_rest(float(x), float(y), (course.heading or 0.0) + course.origin.yaw)

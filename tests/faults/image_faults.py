@@ -199,7 +199,6 @@ def fly_with(
     """
     suite = next(iter(found.task.criteria().values()))
     scenery = Scenery.draw(found.environment(suite), seed)
-    assert scenery is not None
     course = scenery.on(whole_course(found.policy, vehicle))
     with (
         tempfile.TemporaryDirectory(prefix="e2efly-") as folder,

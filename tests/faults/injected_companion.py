@@ -24,7 +24,6 @@ def _stopped(bridge: bool, watchdog: bool) -> Callable[[Stage], Injection]:
 
     def begin(stage: Stage) -> Injection:
         def stand(still: bool) -> None:
-            assert stage.watchdog is not None
             stage.stopped = still if bridge else stage.stopped
             stage.watchdog.stopped = still if watchdog else stage.watchdog.stopped
 
@@ -36,7 +35,6 @@ def _stopped(bridge: bool, watchdog: bool) -> Callable[[Stage], Injection]:
 
 def _disk_full(stage: Stage) -> Injection:
     """Whatever the log writes, the disk has no room for it."""
-    assert stage.log is not None
     with Path("/dev/full").open("wb") as full:
         os.dup2(full.fileno(), stage.log._file)
     return Injection()

@@ -247,7 +247,6 @@ def server() -> Iterator[socket.socket]:
 
 def test_lines_over_tcp_and_a_new_link_after_each_loss(server: socket.socket) -> None:
     source = open_source(f"tcp:127.0.0.1:{server.getsockname()[1]}")
-    assert source.problem is not None
     assert "not connected yet" in source.problem
     for turn in range(2):
         until(lambda: source.read(time.monotonic()) == [] and accepted(server), said=lambda: source.problem)

@@ -148,7 +148,6 @@ def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, li
             read = store.deserialize_cdr(message.data, schema.name)
             found.setdefault(channel.topic, []).append((message.log_time, read))
         summary = reader.get_summary()
-    assert summary is not None
     image_topic = f"/camera/{CAMERA.name}/image"
     assert {channel.topic for channel in summary.channels.values()} == {topic.name for topic in TOPICS} | {
         image_topic, INFO, "/tf",
@@ -285,7 +284,6 @@ def test_a_bridge_that_is_killed_leaves_a_whole_file_and_no_process(tmp_path: Pa
     )
     path = tmp_path / "live.mcap"
     with subprocess.Popen([sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE) as bridge:
-        assert bridge.stdout is not None
         child = int(bridge.stdout.readline())
         bridge.kill()
     until(lambda: not running(child))

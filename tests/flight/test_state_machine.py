@@ -306,7 +306,6 @@ def test_the_target_rises_to_the_height_and_slows_down_before() -> None:
     flight, heights, climbs = taking_off(), [], []
     while flight.mode is Mode.TAKEOFF:
         target = flight.target
-        assert target is not None
         heights.append(target.position[2])
         climbs.append(target.climb)
         flight = flown(flight, having(pilot=HOVER, odometry=at(target.position[2])))
@@ -345,7 +344,6 @@ def test_a_policy_that_lands_may_go_under_the_floor_of_the_fence() -> None:
 def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
     flight = landing()
     later = flown(flight, having(UP, pilot=LAND), 1.0)
-    assert flight.target is not None and later.target is not None
     assert later.target.position[2] == pytest.approx(flight.target.position[2] - SETTINGS.land_speed)
     assert later.target.climb == -SETTINGS.land_speed
     # nobody comes back from a landing by the mission switch
@@ -364,7 +362,6 @@ def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
 def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() -> None:
     fast = having(odometry=at(1.0, velocity=(2.0, 0, 0)), pilot=None)
     flight = flown(policy_flying(), having(AWAY, pilot=None, odometry=fast.odometry))
-    assert flight.target is not None
     assert flight.target.position[0] == pytest.approx(2.0 * 0.15 + 2.0**2 / (2 * 6.0))
     waiting = flown(flight, fast, 1.0)  # first it stops, then it sinks
     assert waiting.target is not None and waiting.target.position[2] == 1.0 and waiting.target.climb == 0.0
@@ -667,7 +664,6 @@ def test_sticks_move_the_hover_in_the_heading_of_the_vehicle_and_no_farther_than
     flight = hovering()
     for _ in range(100):
         flight = flown(flight, having(UP, pilot=Pilot(Mission.HOVER, pitch=1.0, throttle=1.0)), 0.1, ELSEWHERE)
-    assert flight.target is not None
     assert flight.target.position == (SETTINGS.fence.high[0], 0.0, SETTINGS.fence.high[2])
 
 

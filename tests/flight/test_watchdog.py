@@ -213,7 +213,6 @@ class Flying:
             [sys.executable, "-c", BRIDGE, controller.target, json.dumps(STEADY), json.dumps(asdict(plan))],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True,
         )  # fmt: skip
-        assert self.process.stdout is not None
         self.watchdog = int(self.process.stdout.readline())
 
     def close(self) -> None:
@@ -300,7 +299,6 @@ def test_a_bridge_that_hangs_in_flight_and_is_told_when_it_goes_on(
     flight.process.send_signal(signal.SIGSTOP)
     check_landing(controller, since, capsys)
     flight.process.send_signal(signal.SIGCONT)
-    assert flight.process.stdout is not None
     said = flight.process.stdout.readline()
     assert re.match(r"False the watchdog has taken over: the bridge was silent for 1\.\d+ s", said)
     assert all(row != STEADY for at, row in controller.sticks if at > since + REACTION)  # and it stays out of it

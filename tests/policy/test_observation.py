@@ -43,7 +43,6 @@ def test_an_entry_is_trained_exported_flown_and_written_as_c(tmp_path: Path, mon
     policy, vehicle = load_policy(file), load_vehicle("vis_r")
     flight = Runtime.of(policy, course_for(policy.contract, vehicle), vehicle, imu=True)
     v, imu = state.vehicle, state.imu
-    assert imu is not None
     at = Odometry(0.0, *(np.asarray(x[1]) for x in (v.position, v.velocity, v.quaternion, v.body_rate)))
     felt = Imu(np.asarray(imu.gyroscope[1]), np.asarray(imu.accelerometer[1]))
     _, decision = act(flight, begin(flight, at, 0.0), at, 0.0, felt)
