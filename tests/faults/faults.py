@@ -53,8 +53,6 @@ class End(StrEnum):
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault."""
-
     name: str
     during: Mode
     """In which mode it strikes: INIT, HOVER or POLICY."""
@@ -174,8 +172,6 @@ def _rewrite(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], N
 
 
 def _once(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], None]:
-    """Alter the next answer alone."""
-
     def inject(stage: Stage) -> None:
         def altered(payload: bytes) -> bytes:
             del stage.link.rewrites[code]

@@ -29,13 +29,11 @@ class Plug:
     """Opens a link's port, as long as nobody pulls it."""
 
     def __init__(self, opener: Callable[[], Any]) -> None:
-        """Let all through."""
         self.pulled = False
         """The device has gone: what is open fails, and there is nothing to open."""
         self._opener = opener
 
     def __call__(self) -> "_Port":
-        """Open."""
         self.check(errno.ENOENT)
         return _Port(self, self._opener())
 
@@ -46,8 +44,6 @@ class Plug:
 
 
 class _Port:
-    """A port behind a plug."""
-
     def __init__(self, plug: Plug, inner: Any) -> None:
         self._plug, self._inner = plug, inner
         self.close = inner.close
@@ -69,7 +65,6 @@ class FaultyLink:
     """A `Link` around another; each attribute below is a fault, and all may be changed at any time."""
 
     def __init__(self, inner: StreamLink, random: np.random.Generator) -> None:
-        """Let all through."""
         self.silent = False
         """The wires are cut: bytes vanish both ways and nothing tells so."""
         self.garbage = 0.0
@@ -103,7 +98,6 @@ class FaultyLink:
         self._plug.pulled = gone
 
     def heal(self) -> None:
-        """End all faults."""
         self.gone = self.silent = False
         self.garbage = self.spoilt = self.halved = self.delay = 0.0
         self.rewrites.clear()
@@ -111,17 +105,14 @@ class FaultyLink:
 
     @property
     def alive(self) -> bool:
-        """As the inner link says."""
         return self._inner.alive
 
     @property
     def reason(self) -> str:
-        """As the inner link says."""
         return self._inner.reason
 
     @property
     def connections(self) -> int:
-        """As the inner link says."""
         return self._inner.connections
 
     def poll(self, now: float) -> None:
@@ -132,7 +123,6 @@ class FaultyLink:
             self._inner.send(self._out.popleft()[1])
 
     def send(self, data: bytes) -> None:
-        """One frame to the controller."""
         if sticks(data):
             self.throttle = int.from_bytes(data[THROTTLE], "little")
         if not self.silent:
@@ -150,7 +140,6 @@ class FaultyLink:
         return bytes(arrived)
 
     def close(self) -> None:
-        """Close the inner link."""
         self._inner.close()
 
     def _treated(self, frame: MspFrame) -> bytes:
@@ -177,7 +166,6 @@ class FaultyPoses:
     """A `PoseSource` around another: `alter` turns each sample into another, or into none."""
 
     def __init__(self, inner: PoseSource) -> None:
-        """Let all through."""
         self.alter: Callable[[Sample], Sample | None] | None = None
         self.newest: Sample | None = None
         """The last one that was let through as it was."""
@@ -188,12 +176,10 @@ class FaultyPoses:
 
     @property
     def refused(self) -> int:
-        """As the inner source says."""
         return self._inner.refused
 
     @property
     def problem(self) -> str | None:
-        """As the inner source says."""
         return self._inner.problem
 
     def read(self, now: float) -> list[Sample]:
@@ -209,11 +195,9 @@ class FaultyPoses:
         return [altered for sample in samples if self.alter and (altered := self.alter(sample)) is not None]
 
     def close(self) -> None:
-        """Close the inner source."""
         self._inner.close()
 
     def describe(self) -> str:
-        """As the inner source says."""
         return self._inner.describe()
 
 
@@ -221,7 +205,6 @@ class FaultyImages:
     """An `ImageSource` around another: `alter` turns each image into another, or into none."""
 
     def __init__(self, inner: sight.ImageSource) -> None:
-        """Let all through."""
         self.alter: Callable[[sight.Frame], sight.Frame | None] = lambda frame: frame
         self.delay = 0.0
         """By how much images come late, s."""
@@ -233,7 +216,6 @@ class FaultyImages:
 
     @property
     def problem(self) -> str | None:
-        """As the inner source says."""
         return self._inner.problem
 
     def read(self, now: float) -> list[sight.Frame]:
@@ -252,7 +234,6 @@ class FaultyNetwork:
     """An ONNX Runtime session around another."""
 
     def __init__(self, inner: Any) -> None:
-        """Let it work."""
         self.fault = ""
         """nan, raise or late; empty: none."""
         self.late = 0.0

@@ -67,11 +67,9 @@ class FaultyCamera:
 
     @property
     def problem(self) -> str | None:
-        """The source's own."""
         return self.inner.problem
 
     def read(self, now: float) -> list[Frame]:
-        """The frames, changed."""
         found = []
         for frame in self.inner.read(now):
             if self.fault is None or self._last is None:
@@ -84,11 +82,9 @@ class FaultyCamera:
         return found
 
     def close(self) -> None:
-        """Close the source."""
         self.inner.close()
 
     def describe(self) -> str:
-        """The source's name, and the fault's."""
         return f"{self.inner.describe()}, {self.fault or 'no fault'}"
 
 
@@ -170,8 +166,6 @@ def _send(cable: socket.socket, frame: Frame) -> None:
 
 @dataclass(frozen=True)
 class Ended:
-    """What became of a flight."""
-
     mode: str
     """After the fault; policy: nothing was noticed."""
     reason: str
@@ -187,16 +181,7 @@ class Ended:
 def fly_with(
     firmware: Firmware, found: Candidate, vehicle: Vehicle, fault: str, seed: int = 0, flies_s: float = 1.0
 ) -> Ended:
-    """Take off, hand over to a policy that sees, break its camera, and see who flies then.
-
-    Args:
-        firmware: the built firmware.
-        found: the policy.
-        vehicle: of the world and of the bridge.
-        fault: of `FAULTS`, or `UPSIDE_DOWN`.
-        seed: of the world and of the poses' noise.
-        flies_s: how long the policy flies before the fault, s.
-    """
+    """Take off, hand over to a policy that sees, break its camera after `flies_s`, and see who flies then."""
     suite = next(iter(found.task.criteria().values()))
     scenery = Scenery.draw(found.environment(suite), seed)
     course = scenery.on(whole_course(found.policy, vehicle))

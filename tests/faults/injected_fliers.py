@@ -96,7 +96,6 @@ def _clock(stage: Stage, step: float) -> Injection:
 
 
 def _none(stage: Stage) -> Injection:
-    """The process that takes or renders them has ended."""
     del stage
     return Injection(frame=lambda frame: None)
 

@@ -81,8 +81,6 @@ class Injection:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of fault."""
-
     begin: Callable[..., Injection]
     """(stage, **parameters) -> what is at work from now on."""
     draw: Callable[[np.random.Generator], Parameters] = lambda random: {}

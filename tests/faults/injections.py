@@ -186,7 +186,6 @@ class Faults:
             camera.alter = self._frame
 
     def begin(self, strike: Strike) -> None:
-        """Let a fault begin."""
         ends = math.inf if strike.lasts is None else self._stage.rig.now() + strike.lasts
         self._active.append((ends, KINDS[strike.kind].begin(self._stage, **strike.parameters)))
 

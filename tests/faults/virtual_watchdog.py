@@ -54,17 +54,14 @@ class VirtualWatchdog:
 
     @property
     def alive(self) -> bool:
-        """As the bridge's end says."""
         return self._watched.alive
 
     @property
     def reason(self) -> str:
-        """As the bridge's end says."""
         return self._watched.reason
 
     @property
     def connections(self) -> int:
-        """As the bridge's end says."""
         return self._watched.connections
 
     @property
@@ -74,7 +71,6 @@ class VirtualWatchdog:
 
     @property
     def taken_over(self) -> str:
-        """As the bridge's end says."""
         return self._watched.taken_over
 
     def poll(self, now: float) -> None:
@@ -83,11 +79,9 @@ class VirtualWatchdog:
         self._watched.poll(now)
 
     def send(self, data: bytes) -> None:
-        """To the controller."""
         self._watched.send(data)
 
     def receive(self) -> bytes:
-        """From the controller."""
         return self._watched.receive()
 
     def plan(self, plan: DescentPlan) -> None:
@@ -107,7 +101,6 @@ class VirtualWatchdog:
             raise self._problem
 
     def close(self) -> None:
-        """End it, wherever it is."""
         self.stopped, self._ending = False, True
         self._watched.close()
         for patch in self._patches:
@@ -115,7 +108,6 @@ class VirtualWatchdog:
         self._link.close()
 
     def _start(self, command: list[str], pass_fds: list[int], **_: Any) -> SimpleNamespace:
-        """In place of a process."""
         timeout = float(command[4])
         mine = socket.socket(fileno=socket.dup(pass_fds[0]))
         self._thread = threading.Thread(target=self._serve, args=(mine, timeout), daemon=True)

@@ -67,7 +67,6 @@ def fill(topic, image, info, now):
 
 
 def first(source: ImageSource) -> Frame:
-    """The first frame that comes after now."""
     source.read(time.monotonic())
     end = time.monotonic() + 20
     while time.monotonic() < end:

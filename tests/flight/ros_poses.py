@@ -33,7 +33,6 @@ TOPICS = ("/odometry", "/pose", "/estimate")
 
 
 def first(source: PoseSource) -> Sample:
-    """The first sample that comes."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         if samples := source.read(time.monotonic()):
@@ -60,7 +59,6 @@ def check_published(sample: Sample, topic: str) -> None:
 
 
 def problem_of(source: PoseSource) -> str:
-    """What a source says that delivers nothing."""
     deadline = time.monotonic() + PATIENCE_S
     while source.problem is None and time.monotonic() < deadline:
         assert source.read(time.monotonic()) == []

@@ -181,8 +181,6 @@ def test_of_two_commanders_the_first_one_commands_until_it_is_silent() -> None:
 
 
 class Said:
-    """A source of what is put into it."""
-
     refused, problem = 0, None
 
     def __init__(self) -> None:

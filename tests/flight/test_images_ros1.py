@@ -47,7 +47,6 @@ while True:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A ROS master, and a publisher."""
     with (
         ros_master(tmp_path_factory.mktemp("ros1")) as said,
         said.open("a") as output,

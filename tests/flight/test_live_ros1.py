@@ -30,7 +30,6 @@ while missing:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A ROS master."""
     with ros_master(tmp_path_factory.mktemp("ros1")):
         yield
 

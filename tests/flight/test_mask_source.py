@@ -35,8 +35,6 @@ class Speech:
 
 
 class Output:
-    """Keeps what is published."""
-
     def __init__(self) -> None:
         self.speech, self.masks = Speech(), []
 

@@ -26,7 +26,6 @@ while True:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A ROS master, and a publisher."""
     folder = tmp_path_factory.mktemp("ros1")
     with ros_master(folder) as said, said.open("a") as output, publisher(PUBLISHER, SYSTEM_PYTHON, output):
         yield

@@ -124,7 +124,6 @@ def bag(path: Path, messages: tuple[Message, ...] = FLOWN, count: int = 20, stor
 
 
 def only(folder: Path, ending: str) -> Path:
-    """The one file of a folder with an ending."""
     (found,) = folder.glob(f"*{ending}")
     return found
 
@@ -178,6 +177,5 @@ TOKENS = (
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
-    """The bytes of each sample, by its name."""
     folder.mkdir(parents=True, exist_ok=True)
     return {name: make(folder).read_bytes() for name, make in SAMPLES.items()}

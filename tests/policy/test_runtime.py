@@ -247,8 +247,6 @@ def test_broken_odometry_is_named(runtime: Runtime, changes: dict[str, Any], mes
 
 
 class Broken:
-    """A session that fails, as ONNX Runtime's does."""
-
     def run(self, *_: Any) -> None:
         raise RuntimeError("bad allocation")
 
