@@ -6,6 +6,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,6 @@ from e2efly.policy.odometry import Sample
 
 GARBAGE = 40
 """Longest burst of random bytes, bytes."""
-
-
 THROTTLE = slice(9, 11)
 """Where the throttle stands in a message of stick channels, in the order AETR."""
 
@@ -44,21 +43,20 @@ class Plug:
 
 
 class _Port:
+    """A port that can be asked for nothing but its end once the plug is pulled."""
+
     def __init__(self, plug: Plug, inner: Any) -> None:
         self._plug, self._inner = plug, inner
         self.close = inner.close
 
-    def connected(self) -> bool:
+    def __getattr__(self, name: str) -> Any:
         self._plug.check(errno.EIO)
-        return self._inner.connected()
+        return getattr(self._inner, name)
 
-    def read(self) -> bytes:
-        self._plug.check(errno.EIO)
-        return self._inner.read()
 
-    def write(self, data: bytes) -> int:
-        self._plug.check(errno.EIO)
-        return self._inner.write(data)
+def inner(name: str, of: str = "_inner") -> Any:
+    """An attribute that is the inner part's."""
+    return property(attrgetter(f"{of}.{name}"))
 
 
 class FaultyLink:
@@ -103,17 +101,7 @@ class FaultyLink:
         self.rewrites.clear()
         self.other = lambda data: b""
 
-    @property
-    def alive(self) -> bool:
-        return self._inner.alive
-
-    @property
-    def reason(self) -> str:
-        return self._inner.reason
-
-    @property
-    def connections(self) -> int:
-        return self._inner.connections
+    alive, reason, connections, close = map(inner, ("alive", "reason", "connections", "close"))
 
     def poll(self, now: float) -> None:
         """Poll the inner link, and let go of what was held back."""
@@ -138,9 +126,6 @@ class FaultyLink:
         while self._back and self._back[0][0] <= self._now:
             arrived += self._back.popleft()[1]
         return bytes(arrived)
-
-    def close(self) -> None:
-        self._inner.close()
 
     def _treated(self, frame: MspFrame) -> bytes:
         rewrite = self.rewrites.get(frame.code)
@@ -174,13 +159,7 @@ class FaultyPoses:
         self._inner = inner
         self._held: deque[tuple[float, Sample]] = deque()
 
-    @property
-    def refused(self) -> int:
-        return self._inner.refused
-
-    @property
-    def problem(self) -> str | None:
-        return self._inner.problem
+    refused, problem, close, describe = map(inner, ("refused", "problem", "close", "describe"))
 
     def read(self, now: float) -> list[Sample]:
         """What the inner source has, late and altered."""
@@ -194,12 +173,6 @@ class FaultyPoses:
             return samples
         return [altered for sample in samples if self.alter and (altered := self.alter(sample)) is not None]
 
-    def close(self) -> None:
-        self._inner.close()
-
-    def describe(self) -> str:
-        return self._inner.describe()
-
 
 class FaultyImages:
     """An `ImageSource` around another: `alter` turns each image into another, or into none."""
@@ -212,11 +185,8 @@ class FaultyImages:
         """Whether the source says when a late image was taken; otherwise its delay is unknown to it."""
         self._inner = inner
         self._held: deque[tuple[float, sight.Frame]] = deque()
-        self.close, self.describe = inner.close, inner.describe
 
-    @property
-    def problem(self) -> str | None:
-        return self._inner.problem
+    problem, close, describe = map(inner, ("problem", "close", "describe"))
 
     def read(self, now: float) -> list[sight.Frame]:
         """What the inner source has, late and altered."""
