@@ -49,6 +49,12 @@ def flown(flight: Flight, inputs: Inputs, seconds: float = DT, settings: FlightS
     return flight
 
 
+def reached(mode: Mode, flight: Flight, inputs: Inputs, *more: Any, **named: Any) -> Flight:
+    flight = flown(flight, inputs, *more, **named)
+    assert flight.mode is mode
+    return flight
+
+
 def ready() -> Flight:
     flight = flown(Flight(), GOOD)
     assert flight.reasons == (Reason.WAITING,)
@@ -56,33 +62,25 @@ def ready() -> Flight:
 
 
 def taking_off() -> Flight:
-    flight = flown(ready(), having(pilot=HOVER))
-    assert flight.mode is Mode.TAKEOFF
-    return flight
+    return reached(Mode.TAKEOFF, ready(), having(pilot=HOVER))
 
 
 UP = having(pilot=HOVER, odometry=at(1.05))
 
 
 def hovering() -> Flight:
-    flight = flown(taking_off(), UP, 6.0)
-    assert flight.mode is Mode.HOVER
-    return flight
+    return reached(Mode.HOVER, taking_off(), UP, 6.0)
 
 
 AWAY = having(UP, pilot=POLICY)
 
 
 def policy_flying() -> Flight:
-    flight = flown(hovering(), AWAY)
-    assert flight.mode is Mode.POLICY
-    return flight
+    return reached(Mode.POLICY, hovering(), AWAY)
 
 
 def landing() -> Flight:
-    flight = flown(hovering(), having(UP, pilot=LAND))
-    assert flight.mode is Mode.LAND
-    return flight
+    return reached(Mode.LAND, hovering(), having(UP, pilot=LAND))
 
 
 BLIND = having(UP, odometry_problem="too old")
@@ -97,15 +95,11 @@ def sinking() -> Flight:
 
 
 def with_pilot() -> Flight:
-    flight = flown(hovering(), having(UP, override=False))
-    assert flight.mode is Mode.PILOT
-    return flight
+    return reached(Mode.PILOT, hovering(), having(UP, override=False))
 
 
 def done() -> Flight:
-    flight = flown(landing(), having(pilot=LAND), 6.0)
-    assert flight.mode is Mode.DONE
-    return flight
+    return reached(Mode.DONE, landing(), having(pilot=LAND), 6.0)
 
 
 def said(flight: Flight, reason: Reason) -> bool:
@@ -127,8 +121,7 @@ def kept_out(**changes: Any) -> Callable[[], Flight]:
     """A policy that is asked for with something amiss: it does not begin, and one that flies ends in a hover."""
 
     def run() -> Flight:
-        flight = flown(hovering(), having(AWAY, **changes), settings=ELSEWHERE)
-        assert flight.mode is Mode.HOVER
+        flight = reached(Mode.HOVER, hovering(), having(AWAY, **changes), settings=ELSEWHERE)
         stopped = flown(policy_flying(), having(AWAY, **changes), settings=ELSEWHERE)
         assert stopped.mode is Mode.HOVER and stopped.lock
         assert {why.split(":")[0] for why in flight.reasons} == {why.split(":")[0] for why in stopped.reasons}
@@ -139,8 +132,7 @@ def kept_out(**changes: Any) -> Callable[[], Flight]:
 
 def landed_from(begin: Callable[[], Flight], **changes: Any) -> Callable[[], Flight]:
     def run() -> Flight:
-        flight = flown(begin(), having(UP, **changes))
-        assert flight.mode is Mode.LAND
+        flight = reached(Mode.LAND, begin(), having(UP, **changes))
         return flight
 
     return run
@@ -269,13 +261,10 @@ def test_a_whole_flight() -> None:
     assert (flight.mode, flight.target) == (Mode.HOVER, Target((0.0, 0.0, 1.05), 0.0))
     flight = flown(flown(flight, UP), AWAY)
     assert flight.mode is Mode.POLICY  # the switch has left its position: it may fly again
-    flight = flown(flight, having(UP, pilot=LAND), 3 * DT)
-    assert flight.mode is Mode.LAND
-    flight = flown(flight, having(odometry=at(0.05)), 6.0)
-    assert flight.mode is Mode.DONE
+    flight = reached(Mode.LAND, flight, having(UP, pilot=LAND), 3 * DT)
+    flight = reached(Mode.DONE, flight, having(odometry=at(0.05)), 6.0)
     assert flown(flight, having(pilot=HOVER), 1.0).mode is Mode.DONE  # until disarmed
-    flight = flown(flight, having(armed=False, pilot=HOVER))
-    assert flight.mode is Mode.INIT
+    flight = reached(Mode.INIT, flight, having(armed=False, pilot=HOVER))
     assert flown(flight, having(pilot=HOVER), 1.0).mode is Mode.INIT  # the switch was not low since
     assert flown(flown(flight, GOOD), having(pilot=HOVER)).mode is Mode.TAKEOFF
 
@@ -387,8 +376,7 @@ def test_odometry_that_leads_astray_is_not_believed_again_before_the_vehicle_sta
     for begin in (lambda: flown(taking_off(), UP), lambda: flown(landing(), having(UP, pilot=LAND))):
         assert flown(begin(), spiral).misled
     assert flown(astray, UP, 0.5).blind  # not even back at its target
-    by_hand = flown(astray, having(spiral, override=False))
-    assert by_hand.mode is Mode.PILOT
+    by_hand = reached(Mode.PILOT, astray, having(spiral, override=False))
     assert flown(by_hand, spiral).blind  # handed over in the air
     stands = flown(by_hand, having(spiral, override=False, odometry=at(x=1.6)), 0.1)
     assert flown(stands, having(odometry=at(x=1.6))).mode is Mode.INIT
@@ -548,8 +536,7 @@ def test_poses_that_contradict_the_sensors_count_as_lost() -> None:
 
 def test_a_blind_landing_ends_for_good() -> None:
     """A vehicle that may lie on its side must not start its motors because it is seen again."""
-    over = flown(sinking(), DEAF, blind_time(1.0) + 0.1)
-    assert over.mode is Mode.DONE
+    over = reached(Mode.DONE, sinking(), DEAF, blind_time(1.0) + 0.1)
     assert flown(over, UP, 1.0).mode is Mode.DONE
 
 
@@ -557,15 +544,8 @@ def test_a_blind_landing_ends_for_good() -> None:
 def test_nothing_has_landed_while_the_accelerometer_shows_that_it_flies(seen: Inputs) -> None:
     """Whatever the poses say, and whatever time has passed: they may be those of another vehicle."""
     begun = sinking() if seen is BLIND else landing()
-    flies = flown(begun, having(seen, stands=False), 60.0)
-    assert flies.mode is Mode.LAND
+    flies = reached(Mode.LAND, begun, having(seen, stands=False), 60.0)
     assert flown(flies, having(seen, stands=True), 6.0).mode is Mode.DONE
-
-
-def test_a_blind_landing_whose_accelerometer_is_not_sure_waits_long_but_not_for_ever() -> None:
-    begun, longest = sinking(), 2 * blind_time(1.0) + BEYOND_S
-    assert flown(begun, BLIND, longest - 0.2).mode is Mode.LAND
-    assert flown(begun, BLIND, longest + 0.2).mode is Mode.DONE
 
 
 def test_a_landing_from_high_above_is_over_soon_and_arrives_slowly() -> None:
@@ -583,19 +563,21 @@ def test_a_landing_from_high_above_is_over_soon_and_arrives_slowly() -> None:
     assert min(climb for _, climb in steps) >= -FAST
 
 
-@pytest.mark.parametrize("odometry", [None, dataclasses.replace(at(), position=np.full(3, math.nan))])
-def test_a_blind_landing_from_an_unknown_height_lasts_as_from_the_top_of_the_fence(odometry: Odometry | None) -> None:
-    lost, flight = having(UP, odometry=odometry, deaf=True), hovering()
-    longest = blind_time(SETTINGS.fence.high[2] - flight.home)
-    assert flown(flight, lost, longest - 0.2).mode is Mode.LAND
-    assert flown(flight, lost, longest + 0.2).mode is Mode.DONE
+TOP = blind_time(SETTINGS.fence.high[2] - hovering().home)
+CLIMBING = having(DEAF, odometry=at(1.05, velocity=(0, 0, 4.0)))
+LOST: dict[str, tuple[Callable[[], Flight], Inputs, float]] = {
+    "whose accelerometer is not sure": (sinking, BLIND, 2 * blind_time(1.0) + BEYOND_S),
+    "from an unknown height": (hovering, having(DEAF, odometry=None, odometry_problem=None), TOP),
+    "from a height that is no number": (hovering, having(DEAF, odometry=at(math.nan), odometry_problem=None), TOP),
+    "that begins in a climb": (lambda: flown(hovering(), CLIMBING), CLIMBING, blind_time(1.0, 4.0)),
+}
 
 
-def test_a_blind_landing_that_begins_in_a_climb_is_given_the_way_up_and_down_again() -> None:
-    climbing = having(DEAF, odometry=at(1.05, velocity=(0, 0, 4.0)))
-    flight = flown(hovering(), climbing)
-    assert flown(flight, climbing, blind_time(1.0, 4.0) - 0.2).mode is Mode.LAND
-    assert flown(flight, climbing, blind_time(1.0, 4.0) + 0.2).mode is Mode.DONE
+@pytest.mark.parametrize("name", LOST)
+def test_a_blind_landing_is_given_its_time_and_no_more(name: str) -> None:
+    begin, lost, longest = LOST[name]
+    assert flown(begin(), lost, longest - 0.2).mode is Mode.LAND
+    assert flown(begin(), lost, longest + 0.2).mode is Mode.DONE
 
 
 def test_the_link_alone_lands_with_odometry_and_disarming_counts_when_heard() -> None:
@@ -634,13 +616,11 @@ class TestHandingOver:
         by_hand = having(UP, override=False)
         flight = flown(begin(), having(override=False), 0.5)
         assert flight.mode is begin().mode  # standing: it stays
-        flight = flown(flight, by_hand)
-        assert flight.mode is Mode.PILOT
+        flight = reached(Mode.PILOT, flight, by_hand)
         assert flown(flight, UP).mode is Mode.HOVER
 
     def test_a_bridge_that_starts_in_flight_lets_the_pilot_fly(self) -> None:
-        flight = flown(Flight(home=SETTINGS.ground_height), having(UP, override=False))
-        assert flight.mode is Mode.PILOT
+        reached(Mode.PILOT, Flight(home=SETTINGS.ground_height), having(UP, override=False))
 
     def test_a_table_is_no_flight(self) -> None:
         table = having(odometry=at(0.9), armed=False, override=False)
@@ -970,7 +950,6 @@ def test_a_take_off_that_does_not_lift_ends_soon(stands: bool | None, ends: bool
 @pytest.mark.parametrize("deaf", [True, False])
 def test_the_clock_of_a_blind_landing_stands_while_the_controller_flies_its_failsafe(deaf: bool) -> None:
     """It may climb: motors that stop when its receiver comes back would stop high above the ground."""
-    flight = flown(sinking(), having(DEAF if deaf else BLIND, failsafe=True), 30.0)
-    assert flight.mode is Mode.LAND
+    flight = reached(Mode.LAND, sinking(), having(DEAF if deaf else BLIND, failsafe=True), 30.0)
     assert flown(flight, having(DEAF), 0.5).mode is Mode.LAND
     assert flown(flight, having(DEAF), 20.0).mode is Mode.DONE
