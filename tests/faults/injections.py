@@ -108,7 +108,8 @@ KINDS = POSES | COMPANION | FLIERS | {
         _biased(_told), lambda random: {"bias": vector(random, random.uniform(0.01, 0.1))}),
     "accelerometer as told: frozen": Kind(_told_frozen),
     "accelerometer: z scaled": Kind(_scaled(_felt), uniform(factor=(0.9, 1.1))),
-    "accelerometer: biased": Kind(_biased(_felt, 9.81), lambda random: {"bias": vector(random, random.uniform(0.01, 0.08))}),
+    "accelerometer: biased": Kind(
+        _biased(_felt, 9.81), lambda random: {"bias": vector(random, random.uniform(0.01, 0.08))}),
     "link: silent": Kind(held("link", "silent", False), excuse=HELD, limited=(0.1, 5.0)),
     "link: garbage": Kind(held("link", "garbage", 0.0), uniform(value=(0.1, 0.9)), limited=(0.5, 10.0)),
     "link: spoilt": Kind(held("link", "spoilt", 0.0), uniform(value=(0.1, 1.0)), limited=(0.5, 10.0)),

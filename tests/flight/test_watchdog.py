@@ -139,6 +139,11 @@ class Controller:
     def count(self) -> int:
         return len(self.sticks)
 
+    def wait_for(self, more: int) -> None:
+        """Until so many more have come."""
+        count = self.count()
+        until(lambda: self.count() > count + more)
+
     def _serve(self) -> None:
         peer, decoder = None, Decoder()
         while True:
@@ -215,6 +220,12 @@ class Flying:
         )  # fmt: skip
         self.watchdog = int(self.process.stdout.readline())
 
+    def struck(self, number: signal.Signals) -> float:
+        """When the bridge's process got a signal, s."""
+        since = time.monotonic()
+        self.process.send_signal(number)
+        return since
+
     def close(self) -> None:
         for pid in (self.process.pid, self.watchdog):
             if running(pid):
@@ -236,15 +247,18 @@ def fly(controller: Controller) -> Iterator[Callable[..., Flying]]:
         flight.close()
 
 
-def check_landing(controller: Controller, since: float, capsys: pytest.CaptureFixture[str]) -> None:
+def watched(controller: Controller) -> WatchedLink:
+    link = WatchedLink(controller.target)
+    until(lambda: link.poll(0.0) or link.alive)
+    return link
+
+
+def check_landing(controller: Controller, since: float) -> None:
     """It levels by the attitude, descends by the plan, and ends with the throttle closed."""
     until(lambda: controller.count() and controller.sticks[-1][1][2] == 1000)
     until(lambda: controller.sticks[-1][0] - since > 1.0)
     mine = [(at, row) for at, row in controller.sticks if row != STEADY and at >= since]
-    reaction = mine[0][0] - since
-    with capsys.disabled():
-        print(f" [{1e3 * reaction:.0f} ms]", end="")
-    assert reaction < REACTION
+    assert mine[0][0] - since < REACTION
     assert max(at for at, row in controller.sticks if row == STEADY) < mine[0][0]  # nobody else speaks
     throttles = [pulse for pulse, _ in itertools.groupby(row[2] for _, row in mine)]
     assert throttles == [1400, 1450, 1000]
@@ -282,22 +296,12 @@ def test_a_target_that_is_no_link_is_refused_at_once() -> None:
         WatchedLink("udp:nowhere")
 
 
-def test_a_bridge_that_is_killed_in_flight(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
-) -> None:
-    flight = fly()
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
-
-
 def test_a_bridge_that_hangs_in_flight_and_is_told_when_it_goes_on(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
+    controller: Controller, fly: Callable[..., Flying]
 ) -> None:
     flight = fly()
-    since = time.monotonic()
-    flight.process.send_signal(signal.SIGSTOP)
-    check_landing(controller, since, capsys)
+    since = flight.struck(signal.SIGSTOP)
+    check_landing(controller, since)
     flight.process.send_signal(signal.SIGCONT)
     said = flight.process.stdout.readline()
     assert re.match(r"False the watchdog has taken over: the bridge was silent for 1\.\d+ s", said)
@@ -329,28 +333,22 @@ def test_a_bridge_that_hangs_on_the_ground_is_waited_for(controller: Controller,
     flight.process.send_signal(signal.SIGSTOP)
     time.sleep(1.5)
     flight.process.send_signal(signal.SIGCONT)
-    count = controller.count()
-    until(lambda: controller.count() > count + 10)
+    controller.wait_for(10)
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
-@pytest.mark.whole(but=1)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_no_signal_ends_it_in_flight(
-    number: signal.Signals, controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
+@pytest.mark.whole(but=2)
+@pytest.mark.parametrize("number", [0, signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_bridge_that_is_killed_in_flight_is_landed_for_and_no_signal_ends_that(
+    number: int, controller: Controller, fly: Callable[..., Flying]
 ) -> None:
     flight = fly()
-    os.kill(flight.watchdog, number)
-    count = controller.count()
-    until(lambda: controller.count() > count + 10)
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
+    os.kill(flight.watchdog, number)  # 0: none
+    controller.wait_for(10)
+    check_landing(controller, flight.struck(signal.SIGKILL))
 
 
-def test_a_terminal_that_takes_nothing_does_not_hold_it_up(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_terminal_that_takes_nothing_does_not_hold_it_up(controller: Controller, fly: Callable[..., Flying]) -> None:
     """As when the terminal is paused or gone: whatever the watchdog has to say, it flies first."""
     out, end = os.pipe()
     os.set_blocking(end, False)
@@ -358,18 +356,14 @@ def test_a_terminal_that_takes_nothing_does_not_hold_it_up(
         while True:
             os.write(end, b"." * 65536)
     os.set_blocking(end, True)
-    flight = fly(stderr=end)
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
+    check_landing(controller, fly(stderr=end).struck(signal.SIGKILL))
     os.close(out)
     os.close(end)
 
 
 def test_a_watchdog_that_dies_is_seen_as_a_lost_link_and_leaves_nothing_behind(controller: Controller) -> None:
     before = set(Path("/proc/self/fd").iterdir())
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     os.kill(link._process.pid, signal.SIGKILL)
     until(lambda: link.poll(0.0) or not link.alive)
     assert link.reason == "the watchdog process has ended" and not link.taken_over
@@ -384,8 +378,7 @@ def test_a_watchdog_that_dies_is_seen_as_a_lost_link_and_leaves_nothing_behind(c
 
 
 def test_a_watchdog_that_hangs_never_blocks_the_bridge(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     os.kill(link._process.pid, signal.SIGSTOP)
     for _ in range(3000):
         link.send(bytes(1000))
@@ -398,8 +391,7 @@ def test_a_link_that_is_cut_comes_back_in_the_same_flight(controller: Controller
     fly()
     controller.drop.set()
     until(lambda: controller.accepted == 2)
-    count = controller.count()
-    until(lambda: controller.count() > count + 20)
+    controller.wait_for(20)
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
@@ -414,8 +406,7 @@ def test_a_link_that_is_cut_during_the_landing_comes_back(controller: Controller
 
 
 def test_the_bridge_hears_of_a_lost_link(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     controller.drop.set()
     until(lambda: link.poll(0.0) or not link.alive)
     assert "closed the connection" in link.reason
@@ -425,8 +416,7 @@ def test_the_bridge_hears_of_a_lost_link(controller: Controller) -> None:
 
 
 def test_a_plan_that_cannot_be_read_leaves_the_last_one(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     link.plan(PLAN)
     for content in (b"Pgarbage", b"P{}", b"P[]", b"P\xff", b'P{"pulses": 5}', b"?"):
         link._hand(content)
