@@ -17,7 +17,7 @@ FRAME = struct.Struct("<d2I")
 
 def capture(speech: Any, name: str, sees: str, fov: str, path: str) -> None:
     """Publish what comes until the socket is closed, as a camera's cable is pulled."""
-    output = importlib.import_module("capture").Output(speech, name, sees, fov)
+    output = importlib.import_module("capture").ImageOutput(speech, name, sees, fov)
     with socket.socket(socket.AF_UNIX) as link:
         link.connect(path)
         stream = link.makefile("rb")

@@ -80,7 +80,7 @@ def inject(device: Device, stream: Any, unit: float, domain: str) -> None:
 def capture(speech: Any, name: str, sees: str, fov: str, serial: str) -> None:
     """As capture.py does, with this device for the ones that are plugged in."""
     unit, domain = os.environ["SOFTWARE_CAMERA"].split()
-    realsense, output = importlib.import_module("capture_realsense"), importlib.import_module("capture").Output
+    realsense, output = importlib.import_module("capture_realsense"), importlib.import_module("capture").ImageOutput
     device = Device(float(unit))
     stream = rs.stream.color if sees == "rgb" else rs.stream.depth
     thread = threading.Thread(target=inject, args=(device, stream, float(unit), domain), daemon=True)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from e2efly.flight.pilot.fence import fence_problem, moved, stopping
 from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
@@ -734,25 +735,9 @@ def test_who_cannot_stop_inside_is_sent_back(height: float, climb: float) -> Non
 @hypothesis_settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
 def test_heading_and_tilt(yaw: float, pitch: float, roll: float) -> None:
-    def turn(angle: float, axis: int) -> np.ndarray:
-        c, s = math.cos(angle), math.sin(angle)
-        i, j = [(1, 2), (2, 0), (0, 1)][axis]
-        R = np.eye(3)
-        R[i, i] = R[j, j] = c
-        R[j, i], R[i, j] = s, -s
-        return R
-
-    def half(angle: float, axis: int) -> np.ndarray:
-        q = np.array([math.cos(angle / 2), 0.0, 0.0, 0.0])
-        q[1 + axis] = math.sin(angle / 2)
-        return q
-
-    def compose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
-
-    q = compose(compose(half(yaw, 2), half(pitch, 1)), half(roll, 0))
-    R = turn(yaw, 2) @ turn(pitch, 1) @ turn(roll, 0)
-    assert tilt_of(q) == pytest.approx(math.acos(max(-1.0, min(1.0, R[2, 2]))), abs=1e-6)
+    turned = Rotation.from_euler("ZYX", [yaw, pitch, roll])
+    q = turned.as_quat(scalar_first=True)
+    assert tilt_of(q) == pytest.approx(math.acos(max(-1.0, min(1.0, turned.apply([0, 0, 1])[2]))), abs=1e-6)
     assert math.cos(yaw_of(q) - yaw) == pytest.approx(1.0)
 
 

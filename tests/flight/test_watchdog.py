@@ -28,6 +28,7 @@ from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
 from e2efly.flight.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, DescentPlan, WatchedLink, descent
 from tests.faults.virtual_watchdog import VirtualWatchdog
+from tests.flight.test_msp_client import Wire
 from tests.waiting import running, until
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
@@ -426,12 +427,12 @@ def test_a_plan_that_cannot_be_read_leaves_the_last_one(controller: Controller) 
     link.close()
 
 
-class Told:
+class Told(Wire):
     """A link to a controller that says whether it is armed, and the time that passes with each round."""
 
     def __init__(self, armed: Callable[[float], bool | None]) -> None:
-        self.armed, self.now, self.sticks, self.pending = armed, 0.0, [], b""
-        self.closed, self.alive = False, True
+        super().__init__()
+        self.armed, self.now, self.sticks, self.closed = armed, 0.0, [], False
 
     def monotonic(self) -> float:
         return self.now
@@ -439,20 +440,13 @@ class Told:
     def sleep(self, seconds: float) -> None:
         self.now += seconds
 
-    def poll(self, now: float) -> None:
-        pass
-
     def send(self, data: bytes) -> None:
-        for frame in Decoder().feed(data):
+        for frame in self.decoder.feed(data):
             if frame.code == SET_RAW_RC:
                 self.sticks.append(struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload))
             elif frame.code == StatusEx.CODE and (armed := self.armed(self.now)) is not None:
                 payload = struct.pack("<HHHIBHBBBBIB", 250, 0, 0, int(armed), 0, 0, 4, 0, 0, 29, 0, 0)
-                self.pending += encode(MspFrame(StatusEx.CODE, payload, REPLY))
-
-    def receive(self) -> bytes:
-        data, self.pending = self.pending, b""
-        return data
+                self.inbox += encode(MspFrame(StatusEx.CODE, payload, REPLY))
 
     def close(self) -> None:
         self.closed = True
