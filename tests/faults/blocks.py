@@ -21,7 +21,6 @@ class Block:
 
     @property
     def seeds(self) -> range:
-        """Its seeds."""
         first = FIRST + SIZE * self.number
         return range(first, first + SIZE)
 
@@ -32,7 +31,6 @@ def used_in(results: dict[str, Any]) -> tuple[Block, ...]:
 
 
 def told(used: tuple[Block, ...]) -> dict[str, Any]:
-    """The same for a file of results."""
     return {"blocks": [asdict(block) for block in used]}
 
 

@@ -56,18 +56,12 @@ class Scenario:
 
     @staticmethod
     def of(data: dict[str, Any]) -> "Scenario":
-        """From what `dataclasses.asdict` makes of one.
-
-        Raises:
-            ValueError: for an unknown mode or kind, or kinds that cannot be flown together.
-        """
+        """From what `dataclasses.asdict` makes of one."""
         return Scenario(**{**data, "strikes": tuple(Strike(**strike) for strike in data["strikes"])})
 
 
 @dataclass(frozen=True)
 class Flown:
-    """What came of a scenario."""
-
     off_height: float
     """Highest over the ground at which the motors went off before a touch, m."""
     climb: float
@@ -103,16 +97,7 @@ def fly(
     folder: Path,
     look: Callable[[Stage], None] = lambda stage: None,
 ) -> Flown:
-    """Fly a scenario with a firmware of its own.
-
-    Args:
-        scenario: what to do.
-        policy: one that hovers.
-        vehicle: of the bridge's file.
-        firmware: built.
-        folder: for the firmware's settings; made.
-        look: called with the stage before each control step, to watch a flight closely.
-    """
+    """Fly a scenario with a firmware of its own; `look` is called with the stage before each control step."""
     folder.mkdir(parents=True, exist_ok=True)
     body = body_of(scenario.strikes, vehicle)
     with Rig(firmware, folder, body, latency=LATENCY_S, seed=scenario.seed) as rig:
@@ -208,7 +193,6 @@ def beyond(scenario: Scenario, began: float) -> list[Span]:
 
 
 def _ask(stage: Stage) -> None:
-    """The pilot arms and asks for a hover."""
     stage.rig.set(override=True)
     stage.fly(0.3)
     stage.rig.set(armed=True)

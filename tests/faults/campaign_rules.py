@@ -40,8 +40,6 @@ class Span:
 
 @dataclass(frozen=True)
 class Violation:
-    """A rule that was broken."""
-
     rule: Rule
     value: float
     """What was measured."""
@@ -128,6 +126,5 @@ def judge(
 
 
 def _runs(true: np.ndarray) -> list[tuple[int, int]]:
-    """Begin and end of each run of True."""
     edges = np.diff(np.concatenate([[0], true.astype(int), [0]]))
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))

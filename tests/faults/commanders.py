@@ -47,7 +47,6 @@ class Field:
 
     @property
     def stream(self) -> CommandStream:
-        assert self.session.commander is not None
         return self.session.commander.stream
 
     def rest(self) -> tuple[float, float, float]:

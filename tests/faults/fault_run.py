@@ -25,8 +25,6 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a fault."""
-
     fault: str
     end: End
     """What had to come."""
@@ -47,13 +45,7 @@ class Outcome:
 
 
 def strike(stage: Stage, fault: Fault, log: Path) -> Outcome:
-    """Bring the flight to the fault, inject it, watch, and end it.
-
-    Args:
-        stage: with the bridge open.
-        fault: what to do.
-        log: file of the flight's record.
-    """
+    """Bring the flight to the fault, inject it, watch, and end it."""
     if fault.during is Mode.INIT:
         return _refused(stage, fault, log)
     stage.ready(fault.during)

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -53,8 +55,6 @@ class End(StrEnum):
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault."""
-
     name: str
     during: Mode
     """In which mode it strikes: INIT, HOVER or POLICY."""
@@ -126,7 +126,6 @@ def _drift(stage: Stage) -> None:
 def _led_astray(stage: Stage) -> bool:
     """Nothing is to be seen of a wrong heading before it leads the vehicle to the wrong side, and it moves by it."""
     odometry, true = stage.session.bridge.odometry, stage.rig.state
-    assert odometry is not None
     error = math.remainder(yaw_of(odometry.quaternion) - yaw_of(true.quaternion), math.tau)
     return abs(error) > math.pi / 2 and float(np.linalg.norm(true.velocity[:2])) > ASTRAY
 
@@ -159,12 +158,17 @@ def _network(fault: str) -> Callable[[Stage], None]:
     return inject
 
 
-def _link(**faults: float) -> Callable[[Stage], None]:
+def _made(part: str, **faults: Any) -> Callable[[Stage], None]:
+    """Attributes of a part of the stage have other values from now on."""
+
     def inject(stage: Stage) -> None:
         for name, value in faults.items():
-            setattr(stage.link, name, value)
+            setattr(getattr(stage, part), name, value)
 
     return inject
+
+
+_link = partial(_made, "link")
 
 
 def _rewrite(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], None]:
@@ -175,8 +179,6 @@ def _rewrite(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], N
 
 
 def _once(code: int, change: Callable[[bytes], bytes]) -> Callable[[Stage], None]:
-    """Alter the next answer alone."""
-
     def inject(stage: Stage) -> None:
         def altered(payload: bytes) -> bytes:
             del stage.link.rewrites[code]
@@ -214,10 +216,6 @@ def _set(**changes: object) -> Callable[[Stage], None]:
     return lambda stage: stage.rig.set(**changes)
 
 
-def _override_off(stage: Stage) -> None:
-    stage.pilot = stage.pilot_holds
-
-
 def _gust(stage: Stage) -> None:
     """From any side, and a fence that begins not far from where the vehicle is."""
     angle = stage.random.uniform(-np.pi, np.pi)
@@ -244,26 +242,10 @@ def _motor(stage: Stage) -> None:
     stage.rig.shares[int(stage.random.integers(4))] = 0.0
 
 
-def _sag(stage: Stage) -> None:
-    stage.rig.shares = np.full(4, SAGGED)
-
-
 def _short_silence(stage: Stage) -> None:
     end = stage.rig.now() + SILENCE_S
     stage.link.silent = True
     stage.each = lambda: setattr(stage.link, "silent", stage.rig.now() < end)
-
-
-def _unheard(stage: Stage) -> None:
-    stage.rig.heard = False
-
-
-def _late_step(stage: Stage) -> None:
-    stage.session.lateness = 0.05
-
-
-def _nothing(stage: Stage) -> None:
-    del stage
 
 
 FAULTS = (
@@ -278,12 +260,14 @@ FAULTS = (
     Fault("policy: NaN", Mode.POLICY, _network("nan"), End.HOVER, Reason.POLICY, asked=True),
     Fault("policy: exception", Mode.POLICY, _network("raise"), End.HOVER, Reason.POLICY, asked=True),
     Fault("policy: late", Mode.POLICY, _network("late"), End.HOVER, Reason.POLICY, asked=True),
-    Fault("control steps late", Mode.POLICY, _nothing, End.HOVER, Reason.DEADLINES, 0.03, each=_late_step),
+    Fault("control steps late", Mode.POLICY, lambda stage: None, End.HOVER, Reason.DEADLINES, 0.03,
+          each=_made("session", lateness=0.05)),
     Fault("pilot: policy switch off", Mode.POLICY, _set(mission="hover"), End.HOVER, Reason.MISSION, RECEIVER_S),
     Fault("pilot: stick input", Mode.POLICY, _set(roll=0.5), End.HOVER, Reason.STICK_INPUT, RECEIVER_S),
     Fault("fence: a gust", Mode.POLICY, _gust, End.HOVER, None, POSE_S + LATENCY_S, begins=_past_fence,
           each=_calm),
-    Fault("pilot: override off", Mode.POLICY, _override_off, End.PILOT, Reason.OVERRIDE_OFF, RECEIVER_S + 0.05),
+    Fault("pilot: override off", Mode.POLICY, lambda stage: setattr(stage, "pilot", stage.pilot_holds), End.PILOT,
+          Reason.OVERRIDE_OFF, RECEIVER_S + 0.05),
     # the vehicle lands
     Fault("poses: none come", Mode.POLICY, _alter(lambda sample: None), End.LANDED, Reason.NO_ODOMETRY, 0.1),
     Fault("poses: frozen", Mode.POLICY, _freeze, End.LANDED, Reason.NO_ODOMETRY, 0.2 + POSE_S),
@@ -296,9 +280,9 @@ FAULTS = (
     Fault("link: slow, 60 ms each way", Mode.POLICY, _link(delay=0.06), End.LANDED, Reason.LINK, 0.25),
     Fault("battery low", Mode.HOVER, _rewrite(BatteryState.CODE, _low_battery), End.LANDED, Reason.BATTERY_LOW,
           BATTERY_S),
-    Fault("battery: sag", Mode.HOVER, _sag, End.GOES_ON, watch=3.0),
+    Fault("battery: sag", Mode.HOVER, _made("rig", shares=np.full(4, SAGGED)), End.GOES_ON, watch=3.0),
     Fault("link: silent for 0.3 s", Mode.HOVER, _short_silence, End.LANDED, Reason.LINK, 0.25),
-    Fault("receiver: silent", Mode.HOVER, _unheard, End.FAILSAFE, Reason.NO_PILOT, LOST_S),
+    Fault("receiver: silent", Mode.HOVER, _made("rig", heard=False), End.FAILSAFE, Reason.NO_PILOT, LOST_S),
     Fault("motor: one stops", Mode.HOVER, _motor, End.FALLS, within=SPIN_S),
     # nobody but the pilot can help
     Fault("link: cut", Mode.HOVER, _link(silent=True), End.PILOT, Reason.LINK, 0.25),

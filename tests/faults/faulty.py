@@ -6,6 +6,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,6 @@ from e2efly.policy.odometry import Sample
 
 GARBAGE = 40
 """Longest burst of random bytes, bytes."""
-
-
 THROTTLE = slice(9, 11)
 """Where the throttle stands in a message of stick channels, in the order AETR."""
 
@@ -29,13 +28,11 @@ class Plug:
     """Opens a link's port, as long as nobody pulls it."""
 
     def __init__(self, opener: Callable[[], Any]) -> None:
-        """Let all through."""
         self.pulled = False
         """The device has gone: what is open fails, and there is nothing to open."""
         self._opener = opener
 
     def __call__(self) -> "_Port":
-        """Open."""
         self.check(errno.ENOENT)
         return _Port(self, self._opener())
 
@@ -46,30 +43,26 @@ class Plug:
 
 
 class _Port:
-    """A port behind a plug."""
+    """A port that can be asked for nothing but its end once the plug is pulled."""
 
     def __init__(self, plug: Plug, inner: Any) -> None:
         self._plug, self._inner = plug, inner
         self.close = inner.close
 
-    def connected(self) -> bool:
+    def __getattr__(self, name: str) -> Any:
         self._plug.check(errno.EIO)
-        return self._inner.connected()
+        return getattr(self._inner, name)
 
-    def read(self) -> bytes:
-        self._plug.check(errno.EIO)
-        return self._inner.read()
 
-    def write(self, data: bytes) -> int:
-        self._plug.check(errno.EIO)
-        return self._inner.write(data)
+def inner(name: str, of: str = "_inner") -> Any:
+    """An attribute that is the inner part's."""
+    return property(attrgetter(f"{of}.{name}"))
 
 
 class FaultyLink:
     """A `Link` around another; each attribute below is a fault, and all may be changed at any time."""
 
     def __init__(self, inner: StreamLink, random: np.random.Generator) -> None:
-        """Let all through."""
         self.silent = False
         """The wires are cut: bytes vanish both ways and nothing tells so."""
         self.garbage = 0.0
@@ -103,26 +96,12 @@ class FaultyLink:
         self._plug.pulled = gone
 
     def heal(self) -> None:
-        """End all faults."""
         self.gone = self.silent = False
         self.garbage = self.spoilt = self.halved = self.delay = 0.0
         self.rewrites.clear()
         self.other = lambda data: b""
 
-    @property
-    def alive(self) -> bool:
-        """As the inner link says."""
-        return self._inner.alive
-
-    @property
-    def reason(self) -> str:
-        """As the inner link says."""
-        return self._inner.reason
-
-    @property
-    def connections(self) -> int:
-        """As the inner link says."""
-        return self._inner.connections
+    alive, reason, connections, close = map(inner, ("alive", "reason", "connections", "close"))
 
     def poll(self, now: float) -> None:
         """Poll the inner link, and let go of what was held back."""
@@ -132,7 +111,6 @@ class FaultyLink:
             self._inner.send(self._out.popleft()[1])
 
     def send(self, data: bytes) -> None:
-        """One frame to the controller."""
         if sticks(data):
             self.throttle = int.from_bytes(data[THROTTLE], "little")
         if not self.silent:
@@ -148,10 +126,6 @@ class FaultyLink:
         while self._back and self._back[0][0] <= self._now:
             arrived += self._back.popleft()[1]
         return bytes(arrived)
-
-    def close(self) -> None:
-        """Close the inner link."""
-        self._inner.close()
 
     def _treated(self, frame: MspFrame) -> bytes:
         rewrite = self.rewrites.get(frame.code)
@@ -177,7 +151,6 @@ class FaultyPoses:
     """A `PoseSource` around another: `alter` turns each sample into another, or into none."""
 
     def __init__(self, inner: PoseSource) -> None:
-        """Let all through."""
         self.alter: Callable[[Sample], Sample | None] | None = None
         self.newest: Sample | None = None
         """The last one that was let through as it was."""
@@ -186,15 +159,7 @@ class FaultyPoses:
         self._inner = inner
         self._held: deque[tuple[float, Sample]] = deque()
 
-    @property
-    def refused(self) -> int:
-        """As the inner source says."""
-        return self._inner.refused
-
-    @property
-    def problem(self) -> str | None:
-        """As the inner source says."""
-        return self._inner.problem
+    refused, problem, close, describe = map(inner, ("refused", "problem", "close", "describe"))
 
     def read(self, now: float) -> list[Sample]:
         """What the inner source has, late and altered."""
@@ -208,20 +173,11 @@ class FaultyPoses:
             return samples
         return [altered for sample in samples if self.alter and (altered := self.alter(sample)) is not None]
 
-    def close(self) -> None:
-        """Close the inner source."""
-        self._inner.close()
-
-    def describe(self) -> str:
-        """As the inner source says."""
-        return self._inner.describe()
-
 
 class FaultyImages:
     """An `ImageSource` around another: `alter` turns each image into another, or into none."""
 
     def __init__(self, inner: sight.ImageSource) -> None:
-        """Let all through."""
         self.alter: Callable[[sight.Frame], sight.Frame | None] = lambda frame: frame
         self.delay = 0.0
         """By how much images come late, s."""
@@ -229,12 +185,8 @@ class FaultyImages:
         """Whether the source says when a late image was taken; otherwise its delay is unknown to it."""
         self._inner = inner
         self._held: deque[tuple[float, sight.Frame]] = deque()
-        self.close, self.describe = inner.close, inner.describe
 
-    @property
-    def problem(self) -> str | None:
-        """As the inner source says."""
-        return self._inner.problem
+    problem, close, describe = map(inner, ("problem", "close", "describe"))
 
     def read(self, now: float) -> list[sight.Frame]:
         """What the inner source has, late and altered."""
@@ -252,7 +204,6 @@ class FaultyNetwork:
     """An ONNX Runtime session around another."""
 
     def __init__(self, inner: Any) -> None:
-        """Let it work."""
         self.fault = ""
         """nan, raise or late; empty: none."""
         self.late = 0.0

@@ -38,11 +38,7 @@ class Outfit:
 
 
 def flier_of(strikes: tuple[Strike, ...]) -> Flier:
-    """Who has to fly for these faults to matter.
-
-    Raises:
-        ValueError: for kinds that need two.
-    """
+    """Who has to fly for these faults to matter. Kinds that need two are refused."""
     fliers = {KINDS[strike.kind].flier for strike in strikes} - {Flier.POLICY}
     if len(fliers) > 1:
         raise ValueError(f"strikes need {' and '.join(sorted(fliers))} to fly; accepted: one of them")
@@ -60,17 +56,7 @@ def body_of(strikes: tuple[Strike, ...], vehicle: Vehicle) -> Vehicle:
 def outfit(
     strikes: tuple[Strike, ...], height: float, seed: int, rig: Rig, policy: Policy, vehicle: Vehicle, folder: Path
 ) -> Outfit:
-    """Equip a flight, and put the vehicle where it begins.
-
-    Args:
-        strikes: its faults.
-        height: of its hover, m.
-        seed: of its world, if the policy sees.
-        rig: started.
-        policy: one that hovers, for a flight without images.
-        vehicle: of the bridge's file.
-        folder: of its log.
-    """
+    """Equip a flight, and put the vehicle where it begins; `policy` hovers, for a flight without images."""
     kinds, flier = [KINDS[strike.kind] for strike in strikes], flier_of(strikes)
     gear = Gear(
         commands=flier is Flier.COMMANDS, filtered=flier is Flier.FILTER, believed=vehicle,
@@ -95,7 +81,6 @@ def _found(task: str) -> tuple[Candidate, Env]:
 def _by_sight(task: str, seed: int, rig: Rig, vehicle: Vehicle, gear: Gear) -> Outfit:
     found, env = _found(task)
     scenery = Scenery.draw(env, seed)
-    assert scenery is not None
     course = scenery.on(whole_course(found.policy, vehicle))
     x, y, z = course.origin.points(course.start)
     rig.state = rig.world.at_rest(float(x), float(y), (course.heading or 0.0) + course.origin.yaw)

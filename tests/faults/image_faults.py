@@ -7,7 +7,6 @@ import socket
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +28,8 @@ from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
 from e2efly.vehicles.vehicle import Vehicle
 from tests.faults.camera_process import FRAME
+from tests.faults.faulty import FaultyImages, inner
+from tests.waiting import until
 
 LATE_S = 0.15
 """By how much the fault `late` holds images back, s."""
@@ -57,39 +58,22 @@ UPSIDE_DOWN = "upside down"
 """The fault that is there from the start: HOVER must not hand over."""
 
 
-class FaultyCamera:
+class FaultyCamera(FaultyImages):
     """An image source whose frames go through a fault once it is told one."""
 
     def __init__(self, inner: ImageSource) -> None:
-        self.inner = inner
+        super().__init__(inner)
+        self.alter, self.inner = self._altered, inner
         self.fault: str | None = None
         self._last: Frame | None = None
 
-    @property
-    def problem(self) -> str | None:
-        """The source's own."""
-        return self.inner.problem
-
-    def read(self, now: float) -> list[Frame]:
-        """The frames, changed."""
-        found = []
-        for frame in self.inner.read(now):
-            if self.fault is None or self._last is None:
-                self._last, changed = frame, frame
-            elif self.fault == UPSIDE_DOWN:
-                changed = dataclasses.replace(frame, image=frame.image[::-1].copy())
-            else:
-                changed = FAULTS[self.fault][0](frame, self._last)
-            found += [] if changed is None else [changed]
-        return found
-
-    def close(self) -> None:
-        """Close the source."""
-        self.inner.close()
-
-    def describe(self) -> str:
-        """The source's name, and the fault's."""
-        return f"{self.inner.describe()}, {self.fault or 'no fault'}"
+    def _altered(self, frame: Frame) -> Frame | None:
+        if self.fault is None or self._last is None:
+            self._last = frame
+            return frame
+        if self.fault == UPSIDE_DOWN:
+            return dataclasses.replace(frame, image=frame.image[::-1].copy())
+        return FAULTS[self.fault][0](frame, self._last)
 
 
 class ProcessCamera:
@@ -108,9 +92,7 @@ class ProcessCamera:
         (self._cable,) = self._pending
         self._source.read(0.0)  # the first image came before the flight
 
-    @property
-    def problem(self) -> str | None:
-        return self._source.problem
+    problem, describe = inner("problem", of="_source"), inner("describe", of="_source")
 
     def read(self, now: float) -> list[Frame]:
         if self._struck:
@@ -118,11 +100,7 @@ class ProcessCamera:
         found = []
         for frame in self._inner.read(now):
             _send(self._cable, frame)
-            end = time.monotonic() + 20.0
-            while not (come := self._source.read(now)):
-                assert time.monotonic() < end, self.problem
-                time.sleep(1e-4)
-            found += come
+            until(lambda: found.extend(come := self._source.read(now)) or come, said=lambda: self.problem)
         return found
 
     def strike(self, fault: str) -> None:
@@ -132,19 +110,14 @@ class ProcessCamera:
             os.kill(self._source._child.process.pid, signal.SIGKILL)
         else:
             self._cable.shutdown(socket.SHUT_RDWR)
-        end = time.monotonic() + 20.0
-        while FAULTS[fault][1] not in str(self.problem):
-            assert time.monotonic() < end, self.problem
-            self._source.read(0.0)
-            time.sleep(1e-3)
+        until(
+            lambda: self._source.read(0.0) is None or FAULTS[fault][1] in str(self.problem), said=lambda: self.problem
+        )
 
     def close(self) -> None:
         self._source.close()
         self._cable.close()
         self._folder.cleanup()
-
-    def describe(self) -> str:
-        return self._source.describe()
 
 
 def _opened(server: socket.socket, camera: Image, path: str, pending: list[socket.socket]) -> Captured:
@@ -170,8 +143,6 @@ def _send(cable: socket.socket, frame: Frame) -> None:
 
 @dataclass(frozen=True)
 class Ended:
-    """What became of a flight."""
-
     mode: str
     """After the fault; policy: nothing was noticed."""
     reason: str
@@ -187,19 +158,9 @@ class Ended:
 def fly_with(
     firmware: Firmware, found: Candidate, vehicle: Vehicle, fault: str, seed: int = 0, flies_s: float = 1.0
 ) -> Ended:
-    """Take off, hand over to a policy that sees, break its camera, and see who flies then.
-
-    Args:
-        firmware: the built firmware.
-        found: the policy.
-        vehicle: of the world and of the bridge.
-        fault: of `FAULTS`, or `UPSIDE_DOWN`.
-        seed: of the world and of the poses' noise.
-        flies_s: how long the policy flies before the fault, s.
-    """
+    """Take off, hand over to a policy that sees, break its camera after `flies_s`, and see who flies then."""
     suite = next(iter(found.task.criteria().values()))
     scenery = Scenery.draw(found.environment(suite), seed)
-    assert scenery is not None
     course = scenery.on(whole_course(found.policy, vehicle))
     with (
         tempfile.TemporaryDirectory(prefix="e2efly-") as folder,

@@ -12,7 +12,7 @@ from e2efly.flight.betaflight.messages import set_raw_rc
 from tests.faults.faults import wall_clock
 from tests.faults.faulty import sticks
 from tests.faults.injected_poses import stepped
-from tests.faults.injection import Excuse, Injection, Kind, one_of, uniform
+from tests.faults.injection import Excuse, Injection, Kind, held, one_of, uniform
 from tests.faults.stage import Stage
 
 STOOD = (0.05, 2.0)
@@ -24,7 +24,6 @@ def _stopped(bridge: bool, watchdog: bool) -> Callable[[Stage], Injection]:
 
     def begin(stage: Stage) -> Injection:
         def stand(still: bool) -> None:
-            assert stage.watchdog is not None
             stage.stopped = still if bridge else stage.stopped
             stage.watchdog.stopped = still if watchdog else stage.watchdog.stopped
 
@@ -36,16 +35,9 @@ def _stopped(bridge: bool, watchdog: bool) -> Callable[[Stage], Injection]:
 
 def _disk_full(stage: Stage) -> Injection:
     """Whatever the log writes, the disk has no room for it."""
-    assert stage.log is not None
     with Path("/dev/full").open("wb") as full:
         os.dup2(full.fileno(), stage.log._file)
     return Injection()
-
-
-def _unplugged(stage: Stage) -> Injection:
-    link = stage.link
-    link.gone = True
-    return Injection(end=lambda: setattr(link, "gone", False))
 
 
 def _wall(stage: Stage) -> Injection:
@@ -88,12 +80,12 @@ OBEYED = Excuse("the firmware obeys whoever spoke last", unless_grounded=True)
 COMPANION = {
     "clock: the pose source's is set": Kind(lambda stage, step: Injection(pose=stepped(step)), _step),
     "clock: the wall clock jumps to and fro": Kind(_wall),
-    "link: unplugged": Kind(_unplugged, excuse=GONE, limited=(0.1, 5.0), watched=True),
+    "link: unplugged": Kind(held("link", "gone", False), excuse=GONE, limited=(0.1, 5.0), watched=True),
     "disk: full": Kind(_disk_full, logged=True),
     "bridge: stopped": Kind(_stopped(True, False), limited=STOOD, watched=True),
     "watchdog: stopped": Kind(_stopped(False, True), excuse=STILL, limited=STOOD, watched=True),
     "bridge and watchdog: stopped": Kind(_stopped(True, True), excuse=STILL, limited=STOOD, watched=True),
-    "second bridge: asks": Kind(_other(_asks), uniform("share", 0.1, 1.0)),
+    "second bridge: asks": Kind(_other(_asks), uniform(share=(0.1, 1.0))),
     "second bridge: waits on the ground": Kind(
         _other(_waits), one_of("share", 0.02, 0.1, 0.3, 1.0), excuse=OBEYED, limited=(0.1, 2.0)),
 }  # fmt: skip

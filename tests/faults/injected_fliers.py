@@ -95,12 +95,6 @@ def _clock(stage: Stage, step: float) -> Injection:
     return Injection(frame=lambda frame: dataclasses.replace(frame, time=frame.time + step))
 
 
-def _none(stage: Stage) -> Injection:
-    """The process that takes or renders them has ended."""
-    del stage
-    return Injection(frame=lambda frame: None)
-
-
 def _jumping(stage: Stage, mode: str, way: list[float], share: float, period: float) -> Injection:
     """Commands jump to and fro in a direction."""
     began, before, reach = stage.rig.now(), stage.command, share * np.array(way)
@@ -163,8 +157,8 @@ FLIERS = {
     "images: late": Kind(_late, lambda random: {
         "delay": round(float(random.uniform(0.05, 0.5)), 3), "stamped": bool(random.random() < 0.5)},
         flier=SIGHT, limited=(0.5, 10.0)),
-    "images: none": Kind(_none, flier=SIGHT, limited=(0.1, 5.0)),
-    "images: their clock is set": Kind(_clock, uniform("step", -0.5, 0.5), flier=SIGHT),
+    "images: none": Kind(lambda stage: Injection(frame=lambda frame: None), flier=SIGHT, limited=(0.1, 5.0)),
+    "images: their clock is set": Kind(_clock, uniform(step=(-0.5, 0.5)), flier=SIGHT),
     "commands: jump": Kind(_jumping, _jump, flier=Flier.COMMANDS),
     "filter: another vehicle": Kind(
         lambda stage, **factors: Injection(), _factors, flier=Flier.FILTER, body=another),

@@ -9,7 +9,7 @@ import numpy as np
 
 from e2efly.control.vectors import Quat
 from e2efly.policy.odometry import Sample
-from tests.faults.injection import Injection, Kind, one_of, uniform, vector
+from tests.faults.injection import Injection, Kind, held, one_of, uniform, vector
 from tests.faults.stage import Stage
 
 HALF = math.sqrt(0.5)
@@ -40,10 +40,6 @@ def _slow(rate: float) -> Callable[[Sample], Sample | None]:
 
 def _gaps(gap: float, period: float) -> Callable[[Sample], Sample | None]:
     return lambda sample: None if sample.received % period < gap else sample
-
-
-def _none() -> Callable[[Sample], Sample | None]:
-    return lambda sample: None
 
 
 def _moved(sample: Sample, turn: Callable[[np.ndarray], np.ndarray], **changes: Any) -> Sample:
@@ -154,18 +150,11 @@ def _noisy(stage: Stage, position: float, velocity: float, attitude: float) -> I
     return Injection(pose=shaken)
 
 
-def _pose_delay(stage: Stage, delay: float) -> Injection:
-    poses = stage.poses
-    poses.delay = delay
-    return Injection(end=lambda: setattr(poses, "delay", 0.0))
-
-
 POSES = {
     "poses: slow": Kind(_poses(_slow), one_of("rate", 3, 5, 8, 10, 15, 20, 30)),
-    "poses: gaps": Kind(_poses(_gaps), lambda random: {
-        "gap": round(float(random.uniform(0.05, 0.3)), 3), "period": round(float(random.uniform(0.35, 2.0)), 3)}),
-    "poses: none": Kind(_poses(_none)),
-    "poses: late": Kind(_pose_delay, uniform("delay", 0.05, 0.3)),
+    "poses: gaps": Kind(_poses(_gaps), uniform(gap=(0.05, 0.3), period=(0.35, 2.0))),
+    "poses: none": Kind(lambda stage: Injection(pose=lambda sample: None)),
+    "poses: late": Kind(held("poses", "delay", 0.0), uniform(delay=(0.05, 0.3))),
     "poses: mirrored": Kind(_poses(mirrored), one_of("axis", "x", "y", "z", "yaw")),
     "poses: NED and FRD": Kind(_poses(north_east_down)),
     "poses: quaternion xyzw": Kind(_poses(scalar_last)),

@@ -81,8 +81,6 @@ class Injection:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of fault."""
-
     begin: Callable[..., Injection]
     """(stage, **parameters) -> what is at work from now on."""
     draw: Callable[[np.random.Generator], Parameters] = lambda random: {}
@@ -101,9 +99,21 @@ class Kind:
     """(vehicle of the bridge's file, **parameters) -> the vehicle that flies. None: that of the file."""
 
 
-def uniform(name: str, low: float, high: float, digits: int = 3) -> Callable[[np.random.Generator], Parameters]:
-    """One parameter, anywhere between two bounds."""
-    return lambda random: {name: round(float(random.uniform(low, high)), digits)}
+def uniform(digits: int = 3, **bounds: tuple[float, float]) -> Callable[[np.random.Generator], Parameters]:
+    """Parameters, each anywhere between two bounds."""
+    return lambda random: {name: round(float(random.uniform(*ends)), digits) for name, ends in bounds.items()}
+
+
+def held(part: str, name: str, usual: float | bool) -> Callable[..., Injection]:
+    """An attribute of a part of the stage, which has another value for a while: the one that is drawn, or not this."""
+
+    def begin(stage: Any, **drawn: float) -> Injection:
+        of = getattr(stage, part)
+        (value,) = drawn.values() or (not usual,)
+        setattr(of, name, value)
+        return Injection(end=lambda: setattr(of, name, usual))
+
+    return begin
 
 
 def one_of(name: str, *values: Any) -> Callable[[np.random.Generator], Parameters]:

@@ -6,18 +6,16 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from e2efly.flight.betaflight.allowed_modes import FAILSAFE
 from e2efly.flight.betaflight.messages import RawImu, StatusEx
-from e2efly.flight.sight.image_source import Frame
-from e2efly.policy.odometry import Sample
-from e2efly.validation.sitl import FirmwareState
 from tests.faults.injected_companion import COMPANION
 from tests.faults.injected_fliers import FLIERS
 from tests.faults.injected_poses import POSES
-from tests.faults.injection import Excuse, Injection, Kind, Parameters, Rule, one_of, uniform, vector
+from tests.faults.injection import Excuse, Injection, Kind, Parameters, Rule, held, one_of, uniform, vector
 from tests.faults.stage import Stage
 
 COUNTS = 256
@@ -38,16 +36,6 @@ def _told(change: Callable[[np.ndarray], np.ndarray]) -> Injection:
     return Injection(reply=(RawImu.CODE, rewritten))
 
 
-def _told_scaled(stage: Stage, factor: float) -> Injection:
-    del stage
-    return _told(lambda force: force * (1.0, 1.0, factor))
-
-
-def _told_biased(stage: Stage, bias: list[float]) -> Injection:
-    del stage
-    return _told(lambda force: force + np.array(bias))
-
-
 def _told_frozen(stage: Stage) -> Injection:
     del stage
     kept: list[np.ndarray] = []
@@ -60,32 +48,17 @@ def _told_frozen(stage: Stage) -> Injection:
     return _told(same)
 
 
-def _felt_scaled(stage: Stage, factor: float) -> Injection:
-    del stage
-    return Injection(felt=lambda s: dataclasses.replace(s, specific_force=s.specific_force * (1.0, 1.0, factor)))
+def _felt(change: Callable[[np.ndarray], np.ndarray]) -> Injection:
+    """The same as the controller's own sensor feels it, m/s^2."""
+    return Injection(felt=lambda s: dataclasses.replace(s, specific_force=change(s.specific_force)))
 
 
-def _felt_biased(stage: Stage, bias: list[float]) -> Injection:
-    del stage
-    push = 9.81 * np.array(bias)
-    return Injection(felt=lambda s: dataclasses.replace(s, specific_force=s.specific_force + push))
+def _scaled(on: Callable[..., Injection]) -> Callable[..., Injection]:
+    return lambda stage, factor: on(lambda force: force * (1.0, 1.0, factor))
 
 
-def _link(name: str, healed: float | bool) -> Callable[..., Injection]:
-    """An attribute of the link for a while."""
-
-    def begin(stage: Stage, value: float | bool = True) -> Injection:
-        link = stage.link
-        setattr(link, name, value)
-        return Injection(end=lambda: setattr(link, name, healed))
-
-    return begin
-
-
-def _receiver(stage: Stage) -> Injection:
-    rig = stage.rig
-    rig.heard = False
-    return Injection(end=lambda: setattr(rig, "heard", True))
+def _biased(on: Callable[..., Injection], gravity: float = 1.0) -> Callable[..., Injection]:
+    return lambda stage, bias: on(lambda force: force + gravity * np.array(bias))
 
 
 def _failsafe(stage: Stage) -> Injection:
@@ -130,17 +103,18 @@ UNHEARD = Excuse(
 )
 KINDS = POSES | COMPANION | FLIERS | {
     "accelerometer as told: z scaled": Kind(
-        _told_scaled, one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),
+        _scaled(_told), one_of("factor", -1.0, 0.0, 0.9, 0.93, 0.95, 0.97, 0.98, 1.03, 1.05, 1.1, 1.15)),
     "accelerometer as told: biased": Kind(
-        _told_biased, lambda random: {"bias": vector(random, random.uniform(0.01, 0.1))}),
+        _biased(_told), lambda random: {"bias": vector(random, random.uniform(0.01, 0.1))}),
     "accelerometer as told: frozen": Kind(_told_frozen),
-    "accelerometer: z scaled": Kind(_felt_scaled, uniform("factor", 0.9, 1.1)),
-    "accelerometer: biased": Kind(_felt_biased, lambda random: {"bias": vector(random, random.uniform(0.01, 0.08))}),
-    "link: silent": Kind(_link("silent", False), excuse=HELD, limited=(0.1, 5.0)),
-    "link: garbage": Kind(_link("garbage", 0.0), uniform("value", 0.1, 0.9), limited=(0.5, 10.0)),
-    "link: spoilt": Kind(_link("spoilt", 0.0), uniform("value", 0.1, 1.0), limited=(0.5, 10.0)),
-    "link: late": Kind(_link("delay", 0.0), uniform("value", 0.01, 0.1), limited=(0.5, 10.0)),
-    "receiver: silent": Kind(_receiver, excuse=UNHEARD, limited=(0.1, 5.0)),
+    "accelerometer: z scaled": Kind(_scaled(_felt), uniform(factor=(0.9, 1.1))),
+    "accelerometer: biased": Kind(
+        _biased(_felt, 9.81), lambda random: {"bias": vector(random, random.uniform(0.01, 0.08))}),
+    "link: silent": Kind(held("link", "silent", False), excuse=HELD, limited=(0.1, 5.0)),
+    "link: garbage": Kind(held("link", "garbage", 0.0), uniform(value=(0.1, 0.9)), limited=(0.5, 10.0)),
+    "link: spoilt": Kind(held("link", "spoilt", 0.0), uniform(value=(0.1, 1.0)), limited=(0.5, 10.0)),
+    "link: late": Kind(held("link", "delay", 0.0), uniform(value=(0.01, 0.1)), limited=(0.5, 10.0)),
+    "receiver: silent": Kind(held("rig", "heard", True), excuse=UNHEARD, limited=(0.1, 5.0)),
     "receiver: failsafe": Kind(_failsafe, limited=(0.1, 5.0)),
     "battery: sag": Kind(_sag, lambda random: {
         "share": round(float(random.uniform(0.8, 0.95)), 3), "within": round(float(random.uniform(0.1, 5.0)), 2)}),
@@ -178,15 +152,14 @@ class Faults:
 
     def attach(self) -> None:
         """To the stage's present link, poses and rig."""
-        self._stage.poses.alter = self._pose
+        self._stage.poses.alter = partial(self._through, "pose")
         for code in (RawImu.CODE, StatusEx.CODE):
             self._stage.link.rewrites[code] = partial(self._reply, code)
-        self._stage.rig.felt = self._felt
+        self._stage.rig.felt = partial(self._through, "felt")
         for camera in self._stage.cameras:
-            camera.alter = self._frame
+            camera.alter = partial(self._through, "frame")
 
     def begin(self, strike: Strike) -> None:
-        """Let a fault begin."""
         ends = math.inf if strike.lasts is None else self._stage.rig.now() + strike.lasts
         self._active.append((ends, KINDS[strike.kind].begin(self._stage, **strike.parameters)))
 
@@ -197,27 +170,15 @@ class Faults:
             (injection.each if now < ends else injection.end)()
         self._active = [(ends, injection) for ends, injection in self._active if now < ends]
 
-    def _pose(self, sample: Sample) -> Sample | None:
-        altered: Sample | None = sample
+    def _through(self, change: str, what: Any) -> Any:
+        """A sample, an image or what sensors feel, altered by all of them in turn; None: it is lost."""
         for _, injection in self._active:
-            if altered is not None and injection.pose is not None:
-                altered = injection.pose(altered)
-        return altered
-
-    def _frame(self, frame: Frame) -> Frame | None:
-        altered: Frame | None = frame
-        for _, injection in self._active:
-            if altered is not None and injection.frame is not None:
-                altered = injection.frame(altered)
-        return altered
+            if what is not None and (altered := getattr(injection, change)) is not None:
+                what = altered(what)
+        return what
 
     def _reply(self, code: int, payload: bytes) -> bytes:
         for _, injection in self._active:
             if injection.reply is not None and injection.reply[0] == code:
                 payload = injection.reply[1](payload)
         return payload
-
-    def _felt(self, state: FirmwareState) -> FirmwareState:
-        for _, injection in self._active:
-            state = state if injection.felt is None else injection.felt(state)
-        return state

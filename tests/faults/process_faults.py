@@ -53,16 +53,7 @@ def bridge_of(
     options: tuple[str, ...] = (),
     link: str | None = None,
 ) -> Program:
-    """`e2efly fly` as a process, patient where a busy machine holds up the room.
-
-    Args:
-        policy: a policy.onnx.
-        room: the world.
-        log: of the flight.
-        limit: bytes that a file may have; None: any.
-        options: more of the command's; they come last.
-        link: to the firmware; None: straight.
-    """
+    """`e2efly fly` as a process, patient where a busy machine holds up the room; `limit`: bytes of a file."""
     common = ["--flight.takeoff-speed", "0.8", "--flight.land-speed", "0.6"]
     # a busy machine holds up the room, too: not what is looked at here
     common += ["--flight.odometry-timeout", "0.6", "--flight.link-timeout", "1.5"]
@@ -73,14 +64,7 @@ def bridge_of(
 
 
 def strike(fault: str, policy: Path, folder: Path, seed: int = 0) -> ProcessOutcome:
-    """One flight in real time with one of `FAULTS`, in hover.
-
-    Args:
-        fault: one of `FAULTS`.
-        policy: a policy.onnx.
-        folder: of the flight's record.
-        seed: of the moment and of the poses' noise.
-    """
+    """One flight in real time with one of `FAULTS`, in hover."""
     log = folder / f"{fault.replace(' ', '_')}-{seed}.mcap"
     random = np.random.default_rng(seed)
     limit = LOG_LIMIT if fault == "disk full" else None
@@ -143,7 +127,6 @@ def _until_descent(tap: Tap) -> float:
 
 
 def _log_stands(log: Path) -> bool:
-    """Whether the log has stopped growing."""
     end = time.monotonic() + FLIGHT_S
     before, since = -1, time.monotonic()
     while time.monotonic() < end:

@@ -122,17 +122,12 @@ class Stage:
         self.open()
 
     def renew(self) -> None:
-        """New link and pose source, without faults."""
         self.link = FaultyLink(open_link(self.rig.sitl.msp), self.random)
         self.watchdog = VirtualWatchdog(self.rig.now, self.link) if self.gear.watched else None
         self.poses = FaultyPoses(PlantSource(self.rig.poses, "rig"))
 
     def open(self) -> None:
-        """Identify the controller and begin to fly it, as `e2efly fly` does.
-
-        Raises:
-            ValueError: for a controller that is refused outright.
-        """
+        """Identify the controller and begin to fly it, as `e2efly fly` does."""
         gear, link = self.gear, self.watchdog or self.link
         self._commander = Loopback() if gear.commands else None
         try:
@@ -157,7 +152,6 @@ class Stage:
         self.open()
 
     def close(self) -> None:
-        """End the bridge."""
         self.undo.close()
         self.session.close()
         if self._commander is not None:
@@ -172,7 +166,6 @@ class Stage:
 
     @property
     def mode(self) -> Mode:
-        """The bridge's."""
         return self.session.bridge.flight.mode
 
     @property
@@ -186,7 +179,6 @@ class Stage:
             self.session.worker.timeout = seconds
 
     def step(self) -> None:
-        """One control step."""
         for act in (self.pilot, self.each):
             if act is not None:
                 act()
@@ -219,7 +211,6 @@ class Stage:
 
     @property
     def taken_over(self) -> bool:
-        """Whether the watchdog flies."""
         return self.watchdog is not None and self.watchdog.has_taken_over
 
     @property
@@ -232,11 +223,7 @@ class Stage:
         return run(self.rig, self.step, seconds, until)
 
     def ready(self, mode: Mode) -> None:
-        """Bring the flight into INIT, HOVER or POLICY, at a moment of chance.
-
-        Raises:
-            RuntimeError: when it does not come to that: the fault before has left something behind.
-        """
+        """Bring the flight into INIT, HOVER or POLICY, at a moment of chance."""
         if mode is Mode.INIT:
             self._ground()
             return
@@ -270,7 +257,6 @@ class Stage:
 
     @property
     def standing(self) -> bool:
-        """On the ground."""
         return float(self.rig.state.position[2]) < self.rig.world.vehicle.feet_height + 0.01
 
     def pilot_holds(self) -> None:

@@ -9,7 +9,8 @@ from unittest import mock
 
 from e2efly.flight.betaflight import watchdog
 from e2efly.flight.betaflight.link import Link
-from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
+from e2efly.flight.betaflight.watchdog import WatchedLink
+from tests.faults.faulty import inner
 
 UNUSED = "tcp:127.0.0.1:1"
 """The link that a process would open; the thread is given one."""
@@ -23,12 +24,6 @@ class VirtualWatchdog:
     """A bridge's link through a watchdog. One at a time: the module's clock is the rig's while it lives."""
 
     def __init__(self, now: Callable[[], float], link: Link) -> None:
-        """Start it.
-
-        Args:
-            now: the rig's time, s.
-            link: to the controller.
-        """
         self.stopped = False
         """Whether its process stands still."""
         self._link, self._ending = link, False
@@ -52,54 +47,23 @@ class VirtualWatchdog:
             patch.start()
         self._watched = WatchedLink(UNUSED)
 
-    @property
-    def alive(self) -> bool:
-        """As the bridge's end says."""
-        return self._watched.alive
-
-    @property
-    def reason(self) -> str:
-        """As the bridge's end says."""
-        return self._watched.reason
-
-    @property
-    def connections(self) -> int:
-        """As the bridge's end says."""
-        return self._watched.connections
+    alive, reason, connections, taken_over, send, receive, plan = (
+        inner(name, of="_watched")
+        for name in ("alive", "reason", "connections", "taken_over", "send", "receive", "plan")
+    )
 
     @property
     def has_taken_over(self) -> bool:
         """Whether it has the controller. The bridge may not know yet, and never does if it stands still for good."""
         return self._taken
 
-    @property
-    def taken_over(self) -> str:
-        """As the bridge's end says."""
-        return self._watched.taken_over
-
     def poll(self, now: float) -> None:
         """One round of it, then what the bridge's end does."""
         self.step()
         self._watched.poll(now)
 
-    def send(self, data: bytes) -> None:
-        """To the controller."""
-        self._watched.send(data)
-
-    def receive(self) -> bytes:
-        """From the controller."""
-        return self._watched.receive()
-
-    def plan(self, plan: DescentPlan) -> None:
-        """What it has to do without the bridge."""
-        self._watched.plan(plan)
-
     def step(self) -> None:
-        """Let it run until it waits, unless it stands still or has ended.
-
-        Raises:
-            BaseException: whatever ended it.
-        """
+        """Let it run until it waits, unless it stands still or has ended; whatever ended it is raised."""
         if not self.stopped and self._thread.is_alive():
             self._go.release()
             self._back.acquire()
@@ -107,7 +71,6 @@ class VirtualWatchdog:
             raise self._problem
 
     def close(self) -> None:
-        """End it, wherever it is."""
         self.stopped, self._ending = False, True
         self._watched.close()
         for patch in self._patches:
@@ -115,7 +78,6 @@ class VirtualWatchdog:
         self._link.close()
 
     def _start(self, command: list[str], pass_fds: list[int], **_: Any) -> SimpleNamespace:
-        """In place of a process."""
         timeout = float(command[4])
         mine = socket.socket(fileno=socket.dup(pass_fds[0]))
         self._thread = threading.Thread(target=self._serve, args=(mine, timeout), daemon=True)

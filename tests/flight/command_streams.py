@@ -4,15 +4,17 @@ import dataclasses
 import json
 import math
 import socket
-import time
 from collections.abc import Callable
-from types import TracebackType
+from contextlib import closing
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from e2efly.flight.commander.command import Command
 from e2efly.flight.commander.sources import open_commands
+from tests.flight.ros_poses import first as first_of
+from tests.flight.ros_poses import problem_of
 from tests.waiting import free_port
 
 PUBLISHED = """
@@ -65,19 +67,13 @@ class Loopback:
     def __enter__(self) -> "Loopback":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def send(self, message: bytes) -> None:
         self.sender.sendto(message, ("127.0.0.1", self.port))
 
-    @property
-    def refused(self) -> int:
-        return self.source.refused
-
-    @property
-    def problem(self) -> str | None:
-        return self.source.problem
+    refused, problem, describe = (property(attrgetter(f"source.{name}")) for name in ("refused", "problem", "describe"))
 
     def read(self, now: float) -> list[Command]:
         return [dataclasses.replace(command, received=now) for command in self.source.read(now)]
@@ -85,9 +81,6 @@ class Loopback:
     def close(self) -> None:
         self.sender.close()
         self.source.close()
-
-    def describe(self) -> str:
-        return self.source.describe()
 
 
 def _is_position(command: Command) -> None:
@@ -123,28 +116,13 @@ TOPICS: dict[str, Callable[[Command], None]] = {
 
 def first(text: str) -> Command:
     """The first command that a source delivers."""
-    source = open_commands(text)
-    try:
-        deadline = time.monotonic() + 20
-        while time.monotonic() < deadline:
-            if commands := source.read(time.monotonic()):
-                assert 0 <= time.monotonic() - commands[0].received < 5
-                return commands[0]
-            time.sleep(0.01)
-        raise AssertionError(f"{source.describe()} delivered nothing: {source.problem}")
-    finally:
-        source.close()
+    with closing(open_commands(text)) as source:
+        return first_of(source)
 
 
 def refused(text: str) -> str:
     """What a source says of a stream of which nothing is accepted."""
-    source = open_commands(text)
-    try:
-        deadline = time.monotonic() + 20
-        while source.problem is None and time.monotonic() < deadline:
-            assert source.read(time.monotonic()) == []
-            time.sleep(0.01)
+    with closing(open_commands(text)) as source:
+        said = problem_of(source)
         assert source.refused >= 1
-        return str(source.problem)
-    finally:
-        source.close()
+        return said

@@ -34,7 +34,6 @@ def check_given(kind: str, python: str, subscriber: str) -> None:
         while listener.poll() is None and time.monotonic() < end:
             shared.publish(time.monotonic() - 0.5, shown)
             time.sleep(0.05)
-        assert listener.stdout is not None
         got = json.loads(listener.stdout.readline())
     finally:
         listener.kill()

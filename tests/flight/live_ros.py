@@ -90,11 +90,9 @@ class Subscriber:
         self.process.kill()
         self.process.wait()
         self._reader.join(5)
-        assert self.process.stdout is not None
         self.process.stdout.close()
 
     def _read(self) -> None:
-        assert self.process.stdout is not None
         for line in self.process.stdout:
             name, stamp, said = json.loads(line)
             self.heard[name] = stamp, said

@@ -15,6 +15,22 @@ DOMAINS = 200
 """As many test processes have a domain each; DDS has 233."""
 
 
+PUBLISH = """
+import time, rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from builtin_interfaces.msg import Time
+rclpy.init()
+node = rclpy.create_node("publisher")
+best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+publishers = {t: node.create_publisher(kind, t, best_effort if t == "/pose" else 1) for t, kind in KINDS.items()}
+while True:
+    for topic in KINDS:
+        publishers[topic].publish(message_of(topic, Time(sec=1700000000, nanosec=500000000)))
+    time.sleep(0.02)
+"""
+"""The end of a publisher's script, of `KINDS` by topic and `message_of(topic, stamp)`."""
+
+
 @contextmanager
 def ros_domain() -> Iterator[pytest.MonkeyPatch]:
     """The environment leads to the domain; more of it may be set."""

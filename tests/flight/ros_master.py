@@ -18,6 +18,18 @@ PACKAGES = (
 )
 
 
+PUBLISH = """
+import rospy
+rospy.init_node("publisher", anonymous=True, disable_signals=True)
+publishers = {topic: rospy.Publisher(topic, kind, queue_size=1) for topic, kind in KINDS.items()}
+while True:
+    for topic in KINDS:
+        publishers[topic].publish(message_of(topic, rospy.Time(1700000000, 500000000)))
+    rospy.sleep(0.02)
+"""
+"""The end of a publisher's script, of `KINDS` by topic and `message_of(topic, stamp)`."""
+
+
 @contextmanager
 def ros_master(folder: Path) -> Iterator[Path]:
     """A master on a free port, to which the environment leads; the file that gets its output."""

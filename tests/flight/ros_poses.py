@@ -1,13 +1,13 @@
 """What a pose source reads of the topics that the tests of ROS 1 and ROS 2 publish."""
 
 import time
+from typing import Any
 
 import numpy as np
 
-from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.policy.odometry import Sample
+from tests.waiting import until
 
-PATIENCE_S = 20.0
 PUBLISHED = """
 import math
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
@@ -32,15 +32,12 @@ TOPICS = ("/odometry", "/pose", "/estimate")
 """One for each type of message; `/text` has another type."""
 
 
-def first(source: PoseSource) -> Sample:
-    """The first sample that comes."""
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        if samples := source.read(time.monotonic()):
-            assert 0 <= time.monotonic() - samples[0].received < 5
-            return samples[0]
-        time.sleep(0.01)
-    raise AssertionError(f"{source.describe()} delivered nothing: {source.problem}")
+def first(source: Any) -> Any:
+    """The first sample of a pose source, or command of a commander, that comes."""
+    found = []
+    until(lambda: found.extend(source.read(time.monotonic())) or found, said=lambda: source.problem)
+    assert 0 <= time.monotonic() - found[0].received < 5
+    return found[0]
 
 
 def check_published(sample: Sample, topic: str) -> None:
@@ -59,11 +56,12 @@ def check_published(sample: Sample, topic: str) -> None:
         assert sample.body_rate is None
 
 
-def problem_of(source: PoseSource) -> str:
+def problem_of(source: Any) -> str:
     """What a source says that delivers nothing."""
-    deadline = time.monotonic() + PATIENCE_S
-    while source.problem is None and time.monotonic() < deadline:
+
+    def told() -> bool:
         assert source.read(time.monotonic()) == []
-        time.sleep(0.01)
-    assert source.problem is not None
+        return source.problem is not None
+
+    until(told)
     return source.problem

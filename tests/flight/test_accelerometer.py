@@ -24,12 +24,10 @@ def test_what_shows_gravity_upright_is_accepted(counts: tuple[float, ...]) -> No
         ((0, 0, -2048), "180 deg from the body's z axis"),
         ((2048, 0, 0), "90 deg"),
         ((0, 0, 32767), "accepted: 200 to 9000"),
-        ((math.nan, 0, 512), "nan"),
     ],
 )
 def test_what_does_not_is_refused_with_its_numbers(counts: tuple[float, ...], says: str) -> None:
-    problem = standing_problem(np.array(counts, float)) if math.isfinite(counts[0]) else None
-    assert (problem is not None and says in problem) or says == "nan"
+    assert says in str(standing_problem(np.array(counts, float)))
 
 
 @pytest.mark.parametrize("true", [0.93, 1.0, 1.08])

@@ -63,7 +63,6 @@ class World:
         return sample(now, received=now, position=np.array([0.0, 0.0, self.height + 1e-6 * np.sin(1e5 * now)]))
 
     def fly(self, seconds: float) -> None:
-        """Let the vehicle, its controller and the bridge go on."""
         for k in range(round(seconds / DT)):
             self.now += DT
             felt = self.acts.felt(self.now)

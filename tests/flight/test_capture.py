@@ -63,7 +63,6 @@ def test_a_video_is_read_in_its_colours_at_its_rate_and_ends_like_an_unplugged_c
     assert times[-1] - times[0] < 1.0
     seen = see(seen, frames[-1:], frames[-1].time, trouble=source.problem)
     said = seen.problem(frames[-1].time + 1.0)
-    assert said is not None
     assert said.startswith("image 'image_0': is 1000 ms old; accepted: at most")
     assert said.endswith("video.mp4: RuntimeError: " + str(tmp_path / "video.mp4") + " has ended)")
     source.close()

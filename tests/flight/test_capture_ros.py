@@ -16,8 +16,6 @@ RNG = np.random.default_rng(0)
 
 
 class Heard:
-    """A speech that is kept."""
-
     def __init__(self) -> None:
         self.lines: list[tuple[str, ...]] = []
         self.speech, self.sees, self.fov, self.put = self, "depth", None, []

@@ -8,23 +8,14 @@ from e2efly.flight.child import SYSTEM_PYTHON
 from e2efly.flight.commander.sources import open_commands
 from tests.flight.command_streams import PUBLISHED, REFUSED, TOPICS, first, refused
 from tests.flight.ros_domain import publisher
+from tests.flight.ros_master import PUBLISH
 from tests.flight.test_pose_ros1 import ros  # noqa: F401
-
-PUBLISHER = f"""{PUBLISHED}
-import rospy
-rospy.init_node("commander", disable_signals=True)
-publishers = {{topic: rospy.Publisher(topic, kind, queue_size=1) for topic, kind in KINDS.items()}}
-while True:
-    for topic in KINDS:
-        publishers[topic].publish(message_of(topic, rospy.Time(1700000000, 500000000)))
-    rospy.sleep(0.02)
-"""
 
 
 @pytest.fixture(scope="module")
 def commander(ros: None) -> Iterator[None]:  # noqa: F811
     """A publisher of commands, beside that of poses."""
-    with publisher(PUBLISHER, SYSTEM_PYTHON):
+    with publisher(PUBLISHED + PUBLISH, SYSTEM_PYTHON):
         yield
 
 

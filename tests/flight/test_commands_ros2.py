@@ -13,25 +13,13 @@ from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.loading import load_vehicle
 from tests.flight.command_streams import PUBLISHED, REFUSED, TOPICS, first, refused
-from tests.flight.ros_domain import publisher, ros_domain
-
-PUBLISHER = f"""{PUBLISHED}
-import time, rclpy
-from builtin_interfaces.msg import Time
-rclpy.init()
-node = rclpy.create_node("commander")
-publishers = {{topic: node.create_publisher(kind, topic, 1) for topic, kind in KINDS.items()}}
-while True:
-    for topic in KINDS:
-        publishers[topic].publish(message_of(topic, Time(sec=1700000000, nanosec=500000000)))
-    time.sleep(0.02)
-"""
+from tests.flight.ros_domain import PUBLISH, publisher, ros_domain
 
 
 @pytest.fixture(scope="module")
 def ros() -> Iterator[None]:
     """A publisher in a domain of its own that no other machine hears."""
-    with ros_domain(), publisher(PUBLISHER):
+    with ros_domain(), publisher(PUBLISHED + PUBLISH):
         yield
 
 

@@ -32,6 +32,7 @@ from e2efly.simulation.scenes.file import load_scene
 from e2efly.simulation.scenes.scene import clearance
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 VEHICLE = load_vehicle("vis_r")
 FENCE = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 6.0), speed=6.0, tilt=1.4)
@@ -310,22 +311,21 @@ def test_a_fence_in_which_it_could_not_stop_is_refused_by_name(axis: int) -> Non
     assert stopping_distance(accepted, 3.0) <= 2.0 < stopping_distance(accepted, 6.0)
 
 
-def test_a_fence_too_low_to_stop_in_is_refused_by_name() -> None:
-    low = dataclasses.replace(FENCE, low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 0.7))
-    with pytest.raises(ValueError, match=r"stops within 0.[67] m, and the fence is 0.5 m high; accepted: a larger"):
-        Filter.of(VEHICLE, low)
-    Filter.of(VEHICLE, dataclasses.replace(low, high=(6.0, 6.0, 1.0)))
+WEAK = dataclasses.replace(VEHICLE, rotor_thrust_max=float(VEHICLE.mass) * GRAVITY / 4 * 1.4)
 
 
-def test_a_tilt_too_small_to_brake_by_is_refused_by_name() -> None:
-    with pytest.raises(ValueError, match=r"flight.fence.tilt is 0.3 rad; accepted: 0.46 or more"):
-        Filter.of(VEHICLE, dataclasses.replace(FENCE, tilt=0.3))
-
-
-def test_a_vehicle_that_cannot_brake_is_refused_by_name() -> None:
-    weak = dataclasses.replace(VEHICLE, rotor_thrust_max=float(VEHICLE.mass) * GRAVITY / 4 * 1.4)
-    with pytest.raises(ValueError, match=r"thrust is 1.40 of its weight; accepted: 2.50 or more"):
-        Filter.of(weak, FENCE)
+@pytest.mark.parametrize(
+    ("vehicle", "fence", "told"),
+    [
+        (VEHICLE, {"high": (6.0, 6.0, 0.7)}, "stops within 0.[67] m, and the fence is 0.5 m high; accepted: a larger"),
+        (VEHICLE, {"tilt": 0.3}, "flight.fence.tilt is 0.3 rad; accepted: 0.46 or more"),
+        (WEAK, {}, "thrust is 1.40 of its weight; accepted: 2.50 or more"),
+    ],
+)
+def test_what_cannot_brake_or_has_no_room_to_is_refused_by_name(vehicle: Vehicle, fence: dict, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        Filter.of(vehicle, dataclasses.replace(FENCE, **fence))
+    Filter.of(VEHICLE, dataclasses.replace(FENCE, high=(6.0, 6.0, 1.0)))
 
 
 def test_many_vehicles_at_once_are_filtered_as_each_alone() -> None:

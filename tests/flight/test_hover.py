@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from e2efly.control import COMMAND_MODES
 from e2efly.flight.attitude import Attitude
@@ -88,7 +89,7 @@ def fly_blind(
         seen: whether the controller tells its attitude.
     """
     dt, delay = 0.002, 10
-    R = _turn(1, pitch) @ _turn(0, roll)
+    R = Rotation.from_euler("YX", [pitch, roll]).as_matrix()
     rate, height, rows, first = np.zeros(3), 0.0, [], climb
     asked = [(np.zeros(3), GRAVITY)] * (delay + 1)
     attitude = None
@@ -104,20 +105,11 @@ def fly_blind(
             asked.append(asked[-1])
         wanted, thrust = asked.pop(0)
         rate = rate + (wanted - rate) * dt / 0.04
-        speed = np.linalg.norm(rate)
-        if speed > 0:
-            x, y, z = rate / speed
-            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-            R = R @ (np.eye(3) + math.sin(speed * dt) * K + (1 - math.cos(speed * dt)) * K @ K)
+        R = R @ Rotation.from_rotvec(rate * dt).as_matrix()
         rows.append((k * dt, math.acos(min(1.0, R[2, 2])), height, climb))
         climb += (thrust * (1 + error) * R[2, 2] - GRAVITY) * dt
         height += climb * dt
     return np.array(rows)
-
-
-def _turn(axis: int, angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]] if axis == 0 else [[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
 @pytest.mark.parametrize(("roll", "pitch"), [(40, 0), (-40, 0), (0, 40), (30, -30), (170, 0)])
@@ -173,14 +165,7 @@ def test_a_higher_descent_is_given_longer(height: float, more: float, climb: flo
 @hypothesis_settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-1.55, 1.55), st.floats(-3.1, 3.1))
 def test_roll_and_pitch_are_those_of_the_convention(roll: float, pitch: float, yaw: float) -> None:
-    def half(angle: float) -> tuple[float, float]:
-        return math.cos(angle / 2), math.sin(angle / 2)
-
-    (cr, sr), (cp, sp), (cy, sy) = half(roll), half(pitch), half(yaw)
-    q = np.array([
-        cy * cp * cr + sy * sp * sr, cy * cp * sr - sy * sp * cr, cy * sp * cr + sy * cp * sr,
-        sy * cp * cr - cy * sp * sr,
-    ])  # fmt: skip
+    q = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat(scalar_first=True)
     for sign in (1, -1):
         assert roll_pitch(sign * q) == pytest.approx((roll, pitch), abs=1e-6)
 

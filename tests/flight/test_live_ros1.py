@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import pytest
 
 from e2efly.flight.child import SYSTEM_PYTHON
-from e2efly.flight.publish import Live, targets_of
 from e2efly.logs.scripts.ros_topics import TF_DEFINITION
 from tests.flight.live_ros import TAKE, check, check_transforms, heard, latched
 from tests.flight.ros_master import ros_master
@@ -30,7 +29,6 @@ while missing:
 
 @pytest.fixture(scope="module")
 def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A ROS master."""
     with ros_master(tmp_path_factory.mktemp("ros1")):
         yield
 
@@ -44,10 +42,3 @@ def test_a_subscriber_hears_every_topic(ros: None) -> None:
 def test_who_comes_late_hears_the_mode(ros: None) -> None:
     command = [SYSTEM_PYTHON, "-c", SUBSCRIBER.replace("set(kinds)", '{"mode"}').replace('missing.add("/tf")', "")]
     assert latched("ros1", "/e2efly", command)["mode"][1] == "HOVER -> POLICY: switch"
-
-
-def test_without_a_master_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
-    monkeypatch.setenv("E2EFLY_ROS_PYTHON", SYSTEM_PYTHON)
-    with pytest.raises(ValueError, match=r"no ROS master answers .*127\.0\.0\.1:1.*start roscore"):
-        Live(targets_of(["ros1"]))

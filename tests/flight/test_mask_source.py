@@ -14,11 +14,13 @@ import pytest
 
 import e2efly
 from e2efly.flight.sight.fit import fitted
+from e2efly.flight.sight.image_source import Frame
 from e2efly.flight.sight.mask_source import capture, colours_for
 from e2efly.flight.sight.quality import SeenImages, see
 from e2efly.flight.sight.shared import SharedImages, place
 from e2efly.flight.sight.sources import open_image
 from tests.flight.test_segment import CORNERS, HIGH, WIDE, polygon, tag
+from tests.waiting import until
 
 PAD = e2efly.load_policy("land_visual").contract.images[0]
 DEPTH = e2efly.load_policy("avoid").contract.images[0]
@@ -35,8 +37,6 @@ class Speech:
 
 
 class Output:
-    """Keeps what is published."""
-
     def __init__(self) -> None:
         self.speech, self.masks = Speech(), []
 
@@ -144,11 +144,9 @@ def test_a_tag_in_a_video_becomes_the_policys_mask(tmp_path: Path) -> None:
     source = open_image(f"mask:apriltag:36h11:7@v4l2:{path}?fov=policy", PAD)
     try:
         assert "480 rows, 640 columns (AprilTag 36h11, 7x1; v4l2:" in source.describe()
-        seen, end = SeenImages(PAD), time.monotonic() + 20
-        while seen.frame is None:
-            assert time.monotonic() < end
-            seen = see(seen, source.read(time.monotonic()), time.monotonic(), trouble=source.problem)
-            time.sleep(0.005)
+        frames: list[Frame] = []
+        until(lambda: frames.extend(source.read(time.monotonic())) or frames, said=lambda: source.problem)
+        seen = see(SeenImages(PAD), frames, time.monotonic())
         assert seen.fault is None
         assert seen.frame.image.shape == (16, 16)
         assert np.abs(seen.frame.image - truth).sum() <= 2  # cells at the rim that are half covered

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from e2efly.control.vectors import Quat
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.pilot.motion_watch import MotionWatch, feel, see
 from e2efly.policy.odometry import Odometry
@@ -14,15 +14,6 @@ from e2efly.vehicles.gravity import GRAVITY
 
 RATE = 50.0
 Lie = Callable[[Odometry], Odometry]
-
-
-def rotate(angle: float, x: float, y: float, z: float) -> Quat:
-    s = math.sin(angle / 2)
-    return Quat(math.cos(angle / 2), s * x, s * y, s * z)
-
-
-def q(quaternion: Quat) -> np.ndarray:
-    return np.array([quaternion.w, quaternion.x, quaternion.y, quaternion.z], float)
 
 
 def changed(o: Odometry, **changes: np.ndarray) -> Odometry:
@@ -75,7 +66,7 @@ def carried(
     """
     random, watch, said, poses = np.random.default_rng(seed), MotionWatch(), [], []
     axes = np.array([[3.0, 0.0], [2.3, 1.0], [2.7, 0.5]])
-    q_before = None
+    before = None
     for k in range(round(seconds * RATE)):
         t = k / RATE
         ease = min(t / 0.5, 1.0)
@@ -84,24 +75,18 @@ def carried(
         then = min(max(t - 1 / RATE, 0.0) / 0.5, 1.0) * np.sin(axes[:, 0] * max(t - 1 / RATE, 0.0) + axes[:, 1])
         acceleration = speed * (swing - then) * RATE
         roll, pitch, yaw = turn * swing
-        attitude = rotate(yaw, 0, 0, 1).compose(rotate(pitch, 0, 1, 0)).compose(rotate(roll, 1, 0, 0))
-        w, x, y, z = q(attitude)
-        R = np.array([
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ])  # fmt: skip
+        attitude = Rotation.from_euler("ZYX", [yaw, pitch, roll])
+        R = attitude.as_matrix()
         felt = acceleration + np.array([0, 0, GRAVITY])
         force = R.T @ felt + random.normal(0, 0.3, 3)
         gyro = np.zeros(3)
-        if q_before is not None:
-            d = Quat(q_before.w, -q_before.x, -q_before.y, -q_before.z).compose(attitude)
-            gyro = 2 * RATE * np.array([d.x, d.y, d.z], float) + random.normal(0, 0.02, 3)
-        q_before = attitude
+        if before is not None:
+            gyro = RATE * (before.inv() * attitude).as_rotvec() + random.normal(0, 0.02, 3)
+        before = attitude
         up = float(felt @ R[:, 2])
         watch = feel(watch, Attitude(roll, pitch, 0.0), scale * force, gyro, (thrust * up, 0.01 * GRAVITY), t)
         noisy = velocity + random.normal(0, 0.02, 3)
-        poses.append(Odometry(t, np.zeros(3), noisy, q(attitude), np.zeros(3)))
+        poses.append(Odometry(t, np.zeros(3), noisy, attitude.as_quat(scalar_first=True), np.zeros(3)))
         while poses and poses[0].time + late <= t:
             watch = see(watch, lie(poses.pop(0)), latest)
             said.append(watch)

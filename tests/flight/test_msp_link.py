@@ -5,6 +5,7 @@ import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -33,9 +34,18 @@ def tcp(server: socket.socket) -> tuple[StreamLink, socket.socket]:
     return link, peer
 
 
-def test_serial_both_ways() -> None:
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, str]]:
+    """Its master and the path of its slave."""
     master, slave = os.openpty()
-    link = open_link(f"serial:{os.ttyname(slave)}?baud=57600")
+    yield master, os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_serial_both_ways(terminal: tuple[int, str]) -> None:
+    master, slave = terminal
+    link = open_link(f"serial:{slave}?baud=57600")
     assert not link.alive
     link.poll(0.0)
     assert link.alive and link.reason == "" and link.connections == 1
@@ -46,13 +56,10 @@ def test_serial_both_ways() -> None:
     os.write(master, every)
     assert gather(link, 256) == every
     link.close()
-    os.close(master)
-    os.close(slave)
 
 
-def test_serial_bare_path_and_exclusive() -> None:
-    master, slave = os.openpty()
-    first, second = (open_link(os.ttyname(slave)) for _ in range(2))
+def test_serial_bare_path_and_exclusive(terminal: tuple[int, str]) -> None:
+    first, second = (open_link(terminal[1]) for _ in range(2))
     first.poll(0.0)
     second.poll(0.0)
     assert first.alive and not second.alive
@@ -61,8 +68,6 @@ def test_serial_bare_path_and_exclusive() -> None:
     second.poll(RETRY_S + 0.01)
     assert second.alive
     second.close()
-    os.close(master)
-    os.close(slave)
 
 
 def test_serial_device_that_vanishes_and_comes_back(tmp_path: Path) -> None:
@@ -91,16 +96,13 @@ def test_serial_device_that_vanishes_and_comes_back(tmp_path: Path) -> None:
     os.close(slave)
 
 
-def test_serial_that_takes_nothing_breaks_instead_of_blocking() -> None:
-    master, slave = os.openpty()
-    link = open_link(os.ttyname(slave))
+def test_serial_that_takes_nothing_breaks_instead_of_blocking(terminal: tuple[int, str]) -> None:
+    link = open_link(terminal[1])
     link.poll(0.0)
     for _ in range(200):
         link.send(bytes(1000))
     assert not link.alive
     assert "stalled" in link.reason
-    os.close(master)
-    os.close(slave)
 
 
 def test_tcp_both_ways(server: socket.socket) -> None:
@@ -169,20 +171,7 @@ def test_tcp_peer_that_stalls_breaks_the_link_instead_of_blocking(server: socket
 
 
 def test_attempt_without_answer_is_given_up() -> None:
-    class Silent:
-        def connected(self) -> bool:
-            return False
-
-        def read(self) -> bytes:
-            return b""
-
-        def write(self, data: bytes) -> int:
-            return 0
-
-        def close(self) -> None:
-            pass
-
-    link = StreamLink("silent", Silent)
+    link = StreamLink("silent", lambda: Mock(**{"connected.return_value": False}))
     link.poll(0.0)
     link.poll(1.9)
     assert link.reason == "not polled yet"

@@ -19,7 +19,6 @@ def test_a_png_is_what_the_network_is_shown(tmp_path: Path) -> None:
     path = tmp_path / "new" / "image.png"
     write_png(path, colours(image, COLOURS))
     read = cv2.imread(str(path))
-    assert read is not None
     times = read.shape[0] // DEPTH.height
     assert read.shape == (times * DEPTH.height, times * DEPTH.width, 3)
     assert times >= 8

@@ -1,56 +1,35 @@
 """Topics of ROS 2: a real rclpy publisher in a process of its own."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
 from e2efly.flight.pose.sources import open_source
-from tests.flight.ros_domain import publisher, ros_domain
+from tests.flight.ros_domain import PUBLISH, publisher, ros_domain
 from tests.flight.ros_poses import PUBLISHED, TOPICS, check_published, first, problem_of
-
-PUBLISHER = f"""{PUBLISHED}
-import time, rclpy
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from builtin_interfaces.msg import Time
-rclpy.init()
-node = rclpy.create_node("publisher")
-best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-publishers = {{
-    topic: node.create_publisher(kind, topic, best_effort if topic == "/pose" else 1) for topic, kind in KINDS.items()
-}}
-while True:
-    for topic in KINDS:
-        publishers[topic].publish(message_of(topic, Time(sec=1700000000, nanosec=500000000)))
-    time.sleep(0.02)
-"""
 
 
 @pytest.fixture(scope="module")
 def ros() -> Iterator[None]:
     """A publisher in a domain of its own that no other machine hears."""
-    with ros_domain(), publisher(PUBLISHER):
+    with ros_domain(), publisher(PUBLISHED + PUBLISH):
         yield
 
 
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_topic_is_read_whatever_its_type_and_reliability(ros: None, topic: str) -> None:
-    source = open_source(f"ros2:{topic}")
-    try:
+    with closing(open_source(f"ros2:{topic}")) as source:
         assert source.describe().startswith(f"ros2:{topic} (rclpy of ")
         check_published(first(source), topic)
-    finally:
-        source.close()
 
 
 def test_a_topic_of_another_type_is_named(ros: None) -> None:
-    source = open_source("ros2:/text")
-    try:
+    with closing(open_source("ros2:/text")) as source:
         problem = problem_of(source)
         assert "std_msgs/msg/String" in problem
         assert "nav_msgs/msg/Odometry" in problem
-    finally:
-        source.close()
     assert source._child.process.returncode == 0  # type: ignore[attr-defined]
 
 

@@ -247,7 +247,6 @@ def server() -> Iterator[socket.socket]:
 
 def test_lines_over_tcp_and_a_new_link_after_each_loss(server: socket.socket) -> None:
     source = open_source(f"tcp:127.0.0.1:{server.getsockname()[1]}")
-    assert source.problem is not None
     assert "not connected yet" in source.problem
     for turn in range(2):
         until(lambda: source.read(time.monotonic()) == [] and accepted(server), said=lambda: source.problem)
@@ -282,10 +281,14 @@ def accepted(server: socket.socket) -> bool:
     return True
 
 
-def test_of_lines_without_stamps_read_at_once_the_newest_counts(server: socket.socket) -> None:
+def connected(server: socket.socket) -> tuple[PoseSource, socket.socket]:
     source = open_source(f"tcp:127.0.0.1:{server.getsockname()[1]}")
     source.read(time.monotonic())
-    link, _ = server.accept()
+    return source, server.accept()[0]
+
+
+def test_of_lines_without_stamps_read_at_once_the_newest_counts(server: socket.socket) -> None:
+    source, link = connected(server)
     link.sendall(b"".join(encode(position=[k, 0, 0]) + b"\n" for k in range(3)))
     time.sleep(0.05)
     assert [sample.position[0] for sample in gather(source, 1)] == [2]
@@ -306,9 +309,7 @@ def test_of_many_lines_the_newest_are_cut_out_and_the_others_counted() -> None:
 
 
 def test_of_a_flood_over_tcp_the_newest_lines_are_kept(server: socket.socket) -> None:
-    source = open_source(f"tcp:127.0.0.1:{server.getsockname()[1]}")
-    source.read(time.monotonic())
-    link, _ = server.accept()
+    source, link = connected(server)
     link.sendall(b"".join(encode(stamp=k) + b"\n" for k in range(500)))
     time.sleep(0.05)
     samples = gather(source, 1)

@@ -74,7 +74,6 @@ def test_a_bad_sample_is_refused_by_name_and_the_next_good_one_passes(name: str)
     bad = bad if name.startswith("frame") else replace(bad, frame="map")
     after, odometry, reason = track(checks, state, bad)
     assert odometry is None
-    assert reason is not None
     assert reason.startswith(name.split()[0] + ": ")
     assert re.search(text, reason)
     assert after.odometry is state.odometry
@@ -213,7 +212,6 @@ def test_a_source_that_gives_everything_is_used_from_its_first_sample() -> None:
     full = sample(0, velocity=np.array([0.1, 0, 0]), body_rate=np.array([0, 0.2, 0]))
     _, odometry, reason = track(Checks(), PoseTrack(), full)
     assert reason is None
-    assert odometry is not None
     np.testing.assert_array_equal(odometry.velocity, [0.1, 0, 0])
     np.testing.assert_array_equal(odometry.body_rate, [0, 0.2, 0])
 
@@ -257,7 +255,6 @@ def test_a_jump_of_the_source_s_clock_is_reported_once(jump: float) -> None:
     jumped = [sample(0.5 + k * T, stamp=0.5 + k * T + jump) for k in range(50)]
     _, out = fly(Checks(), jumped, hovering())
     reason = out[0][1]
-    assert reason is not None
     assert reason.startswith("clock: the source's clock jumped by")
     assert math.copysign(1, jump) == (1 if "+" in reason.split(";")[0] else -1)
     assert all(reason is None for _, reason in out[1:])
@@ -345,7 +342,6 @@ def test_a_body_rate_is_about_the_body_s_axes() -> None:
     for k in range(50):
         quaternion = product(turned(math.pi / 2, axis=1), turned(1.5 * k * T, axis=0))
         state, odometry, _ = track(checks, state, sample(k * T, quaternion=quaternion))
-    assert odometry is not None
     np.testing.assert_allclose(odometry.body_rate, [1.5, 0, 0], atol=1e-9)
 
 
@@ -360,7 +356,6 @@ def test_the_quaternion_is_continuous_though_the_source_flips_its_sign() -> None
                 np.testing.assert_allclose(odometry.body_rate, [0, 0, 2], atol=1e-9)
             last = odometry.quaternion
         else:
-            assert reason is not None
             assert reason.startswith("starting")
 
 
@@ -382,7 +377,6 @@ def test_after_a_pause_the_estimates_start_anew() -> None:
     state = hovering()
     _, out = fly(Checks(), [sample(1.2, x=2.0), sample(1.21, x=2.0), sample(1.22, x=2.0), sample(1.23, x=2.0)], state)
     assert out[0][1].startswith("starting")
-    assert out[-1][0] is not None
     np.testing.assert_allclose(out[-1][0].velocity, 0, atol=1e-3)
 
 

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,15 +42,23 @@ ODOMETRY: dict[str, Any] = {
     "age": 0.004, "position": [1.0, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5], "quaternion": [HALF, 0.0, 0.0, HALF],
     "body_rate": [0.1, 0.2, 0.3],
 }  # fmt: skip
-INFO = f"/camera/{CAMERA.name}/camera_info"
+IMAGE, INFO = (f"/camera/{CAMERA.name}/{what}" for what in ("image", "camera_info"))
 MODE = {"mode": "POLICY", "previous": "HOVER", "reasons": ["switch"]}
 
 
+Opened = Callable[..., Live]
+
+
 @pytest.fixture
-def lives() -> Iterator[list[Live]]:
-    """What is closed at the end of a test, however it ends."""
+def opened() -> Iterator[Opened]:
+    """Opens outlets, which are closed at the end of a test, however it ends."""
     started: list[Live] = []
-    yield started
+
+    def begin(*targets: str) -> Live:
+        started.append(Live(targets_of(targets), [CAMERA]))
+        return started[-1]
+
+    yield begin
     for live in started:
         for outlet in live.outlets:
             if outlet._process.poll() is None:
@@ -82,29 +90,24 @@ def stamp_of(moment: float) -> int:
     return time.time_ns() - round((time.monotonic() - moment) * 1e9)
 
 
-def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
-    lives: list[Live], network: NetworkTrace
-) -> None:
-    live = Live(targets_of(["foxglove:0"]), [CAMERA])
-    lives.append(live)
+def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(opened: Opened, network: NetworkTrace) -> None:
+    live = opened("foxglove:0")
     (address,) = [outlet.detail for outlet in live.outlets]
     host, port = address.removeprefix("ws://").split(":")
     assert host == "127.0.0.1"
     live.record("mode", time.monotonic(), MODE)  # before anybody listens
     client = FoxgloveClient(host, int(port))
-    image = f"/camera/{CAMERA.name}/image"
-    info = f"/camera/{CAMERA.name}/camera_info"
-    offered = client.advertised(*CHANNELS, "/tf", image, info)
-    assert set(offered) == {*CHANNELS, "/tf", image, info}
-    assert offered[info]["schemaName"] == "foxglove.CameraCalibration"
+    offered = client.advertised(*CHANNELS, "/tf", IMAGE, INFO)
+    assert set(offered) == {*CHANNELS, "/tf", IMAGE, INFO}
+    assert offered[INFO]["schemaName"] == "foxglove.CameraCalibration"
     assert "[m/s]" in json.loads(offered["odometry"]["schema"])["properties"]["velocity"]["description"]
-    assert (offered["/tf"]["schemaName"], offered[image]["schemaName"]) == (
+    assert (offered["/tf"]["schemaName"], offered[IMAGE]["schemaName"]) == (
         "foxglove.FrameTransform",
         "foxglove.RawImage",
     )
     client.subscribe("mode")
     assert json.loads(client.message("mode")[1]) == MODE
-    client.subscribe("imu", image)
+    client.subscribe("imu", IMAGE)
     client.subscribe("odometry")
     start = time.monotonic()
     for i in range(100):  # until the subscription has come through
@@ -115,13 +118,13 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     stamp, data = client.message("imu")
     assert json.loads(data) == {"gyro": [1.0, None, 3.0]}
     assert abs(stamp - stamp_of(start)) < 50e6
-    assert picture().astype("<f4").tobytes() in client.message(image)[1]
-    client.subscribe(info, "/tf")
+    assert picture().astype("<f4").tobytes() in client.message(IMAGE)[1]
+    client.subscribe(INFO, "/tf")
     for _ in range(50):
         live.record("odometry", time.monotonic(), ODOMETRY)
         live.show([SeenImages(CAMERA, Frame(time.monotonic(), picture()))])
         time.sleep(0.01)
-    calibration = client.message(info)[1]
+    calibration = client.message(INFO)[1]
     focal = CAMERA.width / 2 / np.tan(CAMERA.fov_rad[0] / 2)
     assert struct.pack("<d", focal) in calibration and f"{CAMERA.name}_optical".encode() in calibration
     placed = client.message("/tf")[1], client.message("/tf")[1]
@@ -133,9 +136,8 @@ def test_foxglove_hears_the_channels_of_the_log_the_pose_and_the_image(
     assert network.left() == []
 
 
-def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, lives: list[Live]) -> None:
-    live = Live(targets_of([f"mcap:{tmp_path / 'new' / 'live.mcap'}"]), [CAMERA])
-    lives.append(live)
+def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, opened: Opened) -> None:
+    live = opened(f"mcap:{tmp_path / 'new' / 'live.mcap'}")
     start = fly(live)
     live.close()
     assert live.problems == []
@@ -148,17 +150,16 @@ def test_an_mcap_file_says_in_ros_2_s_words_what_was_recorded(tmp_path: Path, li
             read = store.deserialize_cdr(message.data, schema.name)
             found.setdefault(channel.topic, []).append((message.log_time, read))
         summary = reader.get_summary()
-    assert summary is not None
-    image_topic = f"/camera/{CAMERA.name}/image"
     assert {channel.topic for channel in summary.channels.values()} == {topic.name for topic in TOPICS} | {
-        image_topic, INFO, "/tf",
-    }  # fmt: skip
+        IMAGE,
+        INFO,
+        "/tf",
+    }
     check_messages(found, start)
 
 
-def test_a_bag_says_in_ros_1_s_words_what_was_recorded(tmp_path: Path, lives: list[Live]) -> None:
-    live = Live(targets_of([f"bag:{tmp_path / 'live.bag'}"]), [CAMERA])
-    lives.append(live)
+def test_a_bag_says_in_ros_1_s_words_what_was_recorded(tmp_path: Path, opened: Opened) -> None:
+    live = opened(f"bag:{tmp_path / 'live.bag'}")
     start = fly(live)
     live.close()
     assert live.problems == []
@@ -171,9 +172,8 @@ def test_a_bag_says_in_ros_1_s_words_what_was_recorded(tmp_path: Path, lives: li
 
 def check_messages(found: dict[str, list[tuple[int, Any]]], start: float) -> None:
     """What `fly` recorded, by topic."""
-    image_topic = f"/camera/{CAMERA.name}/image"
     assert {topic: len(messages) for topic, messages in found.items()} == {
-        "/odometry": 20, "/imu": 20, "/mode": 1, "/policy/observation": 20, "/policy/action": 20, image_topic: 1,
+        "/odometry": 20, "/imu": 20, "/mode": 1, "/policy/observation": 20, "/policy/action": 20, IMAGE: 1,
         INFO: 1, "/tf": 20,
     }  # fmt: skip
     stamp, odometry = found["/odometry"][3]
@@ -186,7 +186,7 @@ def check_messages(found: dict[str, list[tuple[int, Any]]], start: float) -> Non
     assert np.isnan(imu.linear_acceleration.y) and imu.linear_acceleration.z == 9.81
     np.testing.assert_array_equal(found["/policy/observation"][0][1].data, [0, 1, 2])
     assert found["/mode"][0][1].data == "HOVER -> POLICY: switch"
-    image, info = found[image_topic][0][1], found[INFO][0][1]
+    image, info = found[IMAGE][0][1], found[INFO][0][1]
     assert info.header.stamp == image.header.stamp
     k, p, d = (getattr(info, name, getattr(info, name.lower(), None)) for name in "KPD")
     check_info(info.height, info.width, info.distortion_model, k, p, d, info.header.frame_id)
@@ -203,11 +203,10 @@ def check_messages(found: dict[str, list[tuple[int, Any]]], start: float) -> Non
 
 
 def test_a_process_that_stands_still_costs_the_loop_nothing_and_the_log_no_message(
-    tmp_path: Path, lives: list[Live]
+    tmp_path: Path, opened: Opened
 ) -> None:
     """Four seconds of a flight, as fast as they can be told, to a process that reads none of it."""
-    live = Live(targets_of([f"mcap:{tmp_path / 'live.mcap'}"]), [CAMERA])
-    lives.append(live)
+    live = opened(f"mcap:{tmp_path / 'live.mcap'}")
     outlet = live.outlets[0]
     outlet._process.send_signal(signal.SIGSTOP)
     costs = []
@@ -227,25 +226,24 @@ def test_a_process_that_stands_still_costs_the_loop_nothing_and_the_log_no_messa
     assert statistics.median(costs) < 1e-3  # a wait would be at least as long as the process stands still
     assert live.problems == [f"{outlet.name}: {outlet.dropped} of 3600 records were dropped: it did not take them"]
     outlet._process.send_signal(signal.SIGCONT)
-    end = time.monotonic() + 20
-    while time.monotonic() < end:  # it goes on by itself
+
+    def taken() -> bool:
         before = outlet.dropped
         live.record("mode", time.monotonic(), MODE)
-        if outlet.dropped == before:
-            break
-        time.sleep(0.01)
+        return outlet.dropped == before
+
+    until(taken)  # it goes on by itself
     live.close()
     with (tmp_path / "live.mcap").open("rb") as file:
         topics = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
     assert "/mode" in topics and "/odometry" in topics
 
 
-def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(lives: list[Live]) -> None:
-    live = Live(targets_of(["foxglove:0"]), [CAMERA])
-    lives.append(live)
-    port, image = int(live.outlets[0].detail.rpartition(":")[2]), f"/camera/{CAMERA.name}/image"
+def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(opened: Opened) -> None:
+    live = opened("foxglove:0")
+    port = int(live.outlets[0].detail.rpartition(":")[2])
     stalled, other = FoxgloveClient("127.0.0.1", port), FoxgloveClient("127.0.0.1", port)
-    stalled.subscribe(image)  # and never reads again
+    stalled.subscribe(IMAGE)  # and never reads again
     other.subscribe("odometry")
     told = 0
     for i in range(1500):  # more than the sockets between them keep
@@ -259,10 +257,9 @@ def test_a_browser_that_stalls_holds_up_neither_the_process_nor_another_browser(
     other.close()
 
 
-def test_a_process_that_is_killed_is_told_once_and_another_goes_on(tmp_path: Path, lives: list[Live]) -> None:
+def test_a_process_that_is_killed_is_told_once_and_another_goes_on(tmp_path: Path, opened: Opened) -> None:
     said: list[str] = []
-    live = Live(targets_of(["foxglove:0", f"bag:{tmp_path / 'live.bag'}"]))
-    lives.append(live)
+    live = opened("foxglove:0", f"bag:{tmp_path / 'live.bag'}")
     live.say = said.append
     live.outlets[0]._process.kill()
     live.outlets[0]._process.wait()
@@ -271,7 +268,7 @@ def test_a_process_that_is_killed_is_told_once_and_another_goes_on(tmp_path: Pat
     assert said == ["live foxglove:0: its process has ended; the flight goes on without it"]
     assert any("foxglove:0: its process has ended" in problem for problem in live.problems)
     with AnyReader([tmp_path / "live.bag"]) as reader:
-        assert sum(1 for _ in reader.messages()) == 101
+        assert sum(1 for _ in reader.messages()) == 103
 
 
 def test_a_bridge_that_is_killed_leaves_a_whole_file_and_no_process(tmp_path: Path) -> None:
@@ -285,7 +282,6 @@ def test_a_bridge_that_is_killed_leaves_a_whole_file_and_no_process(tmp_path: Pa
     )
     path = tmp_path / "live.mcap"
     with subprocess.Popen([sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE) as bridge:
-        assert bridge.stdout is not None
         child = int(bridge.stdout.readline())
         bridge.kill()
     until(lambda: not running(child))

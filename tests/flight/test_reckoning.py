@@ -112,7 +112,6 @@ def test_a_map_that_was_never_learned_leaves_the_word_to_the_accelerometer(wrong
 def test_the_speed_is_the_accelerometers_as_far_as_the_throttles_allows() -> None:
     known = seen(moving(0j, 0.0), 0.0)
     after = reckon(known, LEVEL, (0.0, 0.0, GRAVITY + 1.0), (GRAVITY - 1.0, 0.5), STILL, 0.1)
-    assert after is not None
     assert after.velocity[2] == pytest.approx(-0.1) and after.lifted == pytest.approx(-0.3)
     assert after.doubt == pytest.approx(DOUBT + 0.05) and after.climb == pytest.approx(-0.3 + (DOUBT + 0.05) / 2)
     assert after.height == pytest.approx((after.lifted + after.doubt) * 0.1)
@@ -122,7 +121,6 @@ def test_what_is_not_known_is_taken_from_the_other() -> None:
     known = seen(moving(1 + 0j, 0.0), 5.0)
     by_force = reckon(known, LEVEL, (0.0, 0.0, GRAVITY - 1.0), None, STILL, 5.05)
     by_thrust = reckon(known, LEVEL, None, (GRAVITY - 1.0, 0.3), STILL, 5.05)
-    assert by_force is not None and by_thrust is not None
     assert by_force.climb == by_force.lifted == by_thrust.climb == by_thrust.lifted == pytest.approx(-0.25)
     level = reckon(known, None, (0.0, 0.0, GRAVITY), None, STILL, 5.05)
     assert level is not None and level.velocity == pytest.approx((1.0, 0.0, -0.2))
@@ -141,7 +139,6 @@ def test_a_silence_counts_the_tilt_on_and_does_not_age_the_velocity(held: float)
             pitch += rate * DT
             speed += GRAVITY * math.tan(pitch) * DT
             known = reckon(known, None, None, (GRAVITY / math.cos(pitch), 0.1), (0.0, rate, 0.0), (k + 1) * DT)
-        assert known is not None
         assert known.velocity[0] == pytest.approx(speed, rel=0.2) and abs(speed) > 1.5
         assert known.velocity[1] == pytest.approx(0.0, abs=0.01)
         assert known.since == pytest.approx(known.time)  # the time to brake begins once the controller is heard

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,7 +27,6 @@ from tests.waiting import free_port, until
 
 @pytest.fixture
 def manager(tmp_path: Path) -> Iterator[socket.socket]:
-    """The socket of a service manager."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(tmp_path / "notify"))
         listener.setblocking(False)
@@ -109,36 +110,41 @@ def test_an_abstract_socket_of_the_environment(monkeypatch: pytest.MonkeyPatch) 
         assert told(listener)[0].startswith("READY=1")
 
 
-def test_the_command_feeds_it_until_it_hangs(manager: socket.socket, tmp_path: Path) -> None:
-    with controller(recorded) as client:
+@contextmanager
+def flies(reply: Callable[[int], bytes], log: Path, **more: Any) -> Iterator[subprocess.Popen[str]]:
+    """`e2efly fly` as a process, with a controller."""
+    with controller(reply) as client:
         command = [sys.executable, "-m", "e2efly", "fly", "hover", "--link", client.link.name]  # type: ignore[attr-defined]
-        command += ["--pose", f"udp:{free_port()}", "--log", str(tmp_path / "flight.mcap")]
-        environment = {**os.environ, "NOTIFY_SOCKET": manager.getsockname()}
-        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
+        command += ["--pose", f"udp:{free_port()}", "--log", str(log)]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, text=True, **more)
         try:
-            heard = _until(manager, lambda lines: len(lines) > 5)
-            assert heard[0].startswith("READY=1")
-            process.send_signal(signal.SIGSTOP)
-            time.sleep(0.3)
-            told(manager)
-            time.sleep(0.5)
-            assert told(manager) == []
-            process.send_signal(signal.SIGCONT)
-            process.send_signal(signal.SIGTERM)
-            _until(manager, lambda lines: any(line.startswith("STOPPING=1") for line in lines))
-            assert process.wait(30) == 0
+            yield process
         finally:
+            if isinstance(reply, Flying):
+                reply.boxes = ()  # else the watchdog of one that began would stay
             process.kill()
             process.wait()
 
 
-def _until(manager: socket.socket, found: Callable[[list[str]], bool]) -> list[str]:
-    lines, end = list[str](), time.monotonic() + 60
-    while not found(lines):
-        assert time.monotonic() < end, lines
-        lines += told(manager)
-        time.sleep(0.02)
-    return lines
+def test_the_command_feeds_it_until_it_hangs(manager: socket.socket, tmp_path: Path) -> None:
+    environment, lines = {**os.environ, "NOTIFY_SOCKET": manager.getsockname()}, list[str]()
+
+    def heard(first: str) -> bool:
+        lines.extend(told(manager))
+        return any(line.startswith(first) for line in lines)
+
+    with flies(recorded, tmp_path / "flight.mcap", env=environment) as process:
+        until(lambda: heard("READY=1") and len(lines) > 5, 60.0)
+        assert lines[0].startswith("READY=1")
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.3)
+        told(manager)
+        time.sleep(0.5)
+        assert told(manager) == []
+        process.send_signal(signal.SIGCONT)
+        process.send_signal(signal.SIGTERM)
+        until(lambda: heard("STOPPING=1"), 60.0)
+        assert process.wait(30) == 0
 
 
 class Flying:
@@ -164,16 +170,8 @@ class Flying:
 def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:
     """Its first frame would close the throttle."""
     reply, log = Flying(ARM, OVERRIDE), tmp_path / "flight.mcap"
-    with controller(reply) as client:
-        command = [sys.executable, "-m", "e2efly", "fly", "hover", "--link", client.link.name]  # type: ignore[attr-defined]
-        command += ["--pose", f"udp:{free_port()}", "--log", str(log)]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        try:
-            said = " ".join(process.communicate(timeout=60)[1].split())
-        finally:
-            reply.boxes = ()  # else the watchdog of one that began would stay
-            process.kill()
-            process.wait()
+    with flies(reply, log, stderr=subprocess.PIPE) as process:
+        said = " ".join(process.communicate(timeout=60)[1].split())
     assert process.returncode == 2
     assert "armed and its override is on, so that the first frame, which closes the throttle, would stop" in said
     assert "accepted: disarmed, or override low" in said
@@ -185,23 +183,13 @@ def test_started_in_flight_it_takes_nothing_over(tmp_path: Path) -> None:
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("boxes", [(), (ARM,), (OVERRIDE,)], ids=["neither", "armed", "override"])
 def test_on_the_ground_or_beside_a_pilot_who_flies_it_begins(boxes: tuple[int, ...], tmp_path: Path) -> None:
-    reply, began = Flying(*boxes), time.monotonic()
-    with controller(reply) as client:
-        command = [sys.executable, "-m", "e2efly", "fly", "hover", "--link", client.link.name]  # type: ignore[attr-defined]
-        command += ["--pose", f"udp:{free_port()}", "--log", str(tmp_path / "flight.mcap")]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-        try:
-            while SET_RAW_RC not in reply.asked:
-                assert process.poll() is None
-                assert time.monotonic() < began + 60
-                time.sleep(0.02)
-            reply.boxes = ()  # disarmed, it ends
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(30) == 0
-        finally:
-            reply.boxes = ()  # else its watchdog would stay
-            process.kill()
-            process.wait()
+    reply = Flying(*boxes)
+    with flies(reply, tmp_path / "flight.mcap") as process:
+        until(lambda: SET_RAW_RC in reply.asked or process.poll() is not None, 60.0)
+        assert process.poll() is None
+        reply.boxes = ()  # disarmed, it ends
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
 
 
 def test_the_first_process_ends_after_what_its_command_leaves_behind(tmp_path: Path) -> None:

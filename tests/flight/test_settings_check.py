@@ -15,7 +15,7 @@ from e2efly.commands.fly_check import add_lags, mount, print_settings, print_tab
 from e2efly.flight.betaflight import messages, settings_by_name
 from e2efly.flight.betaflight.allowed_modes import ANGLE
 from e2efly.flight.betaflight.client import MESSAGES, Client
-from e2efly.flight.betaflight.codec import ERROR, Decoder, MspFrame, encode
+from e2efly.flight.betaflight.codec import ERROR, MspFrame, encode
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.mode_slots import ModeRange
@@ -29,6 +29,7 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Sample
 from e2efly.policy.zoo import policy_file
 from e2efly.vehicles.loading import load_vehicle
+from tests.flight.test_msp_client import Wire
 
 REPLIES: dict[str, dict[str, str]] = json.loads(
     (Path(__file__).parents[1] / "data" / "msp_releases.json").read_text(encoding="utf-8")
@@ -38,19 +39,15 @@ LIGHT = replace(VEHICLE, mass=VEHICLE.mass / 2)
 NEWEST = list(REPLIES)[-1]
 
 
-class Wire:
+class Recorded(Wire):
     """A link to a recorded controller."""
 
-    alive, reason, connections = True, "", 1
-
     def __init__(self, version: str) -> None:
-        self.replies, self.decoder, self.pending = REPLIES[version], Decoder(), b""
-
-    def poll(self, now: float) -> None:
-        pass
+        super().__init__()
+        self.replies = REPLIES[version]
 
     def send(self, data: bytes) -> None:
-        self.pending += b"".join(self.reply(frame) for frame in self.decoder.feed(data))
+        self.inbox += b"".join(self.reply(frame) for frame in self.decoder.feed(data))
 
     def reply(self, frame: MspFrame) -> bytes:
         if frame.code != settings_by_name.CODE:
@@ -60,16 +57,9 @@ class Wire:
             return encode(MspFrame(frame.code, direction=ERROR, version=2))
         return bytes.fromhex(self.replies[key])
 
-    def receive(self) -> bytes:
-        data, self.pending = self.pending, b""
-        return data
-
-    def close(self) -> None:
-        pass
-
 
 def recorded(version: str) -> ControllerInfo:
-    return identify(Client(Wire(version)))
+    return identify(Client(Recorded(version)))
 
 
 def rows_of(info: ControllerInfo, vehicle: object = VEHICLE) -> dict[str, Row]:

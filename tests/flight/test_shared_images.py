@@ -43,7 +43,6 @@ def _gone() -> Iterator[None]:
 def test_what_another_process_publishes_arrives_whole_and_in_order() -> None:
     """It writes as fast as it can; no image is half of one and half of the next."""
     with subprocess.Popen([sys.executable, "-c", PUBLISHER, NAME], stdout=subprocess.PIPE) as publisher:
-        assert publisher.stdout is not None
         assert publisher.stdout.readline() == b"ready\n"
         camera, times, ages = SharedCamera(NAME, CAMERA), [], []
         end = time.monotonic() + 1.0

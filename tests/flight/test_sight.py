@@ -41,7 +41,6 @@ def test_fresh_changing_images_are_flown_by_until_they_are_old() -> None:
         assert seen.problem(0.03 * k + 0.01) is None
     assert seen.problem(0.12 + seen.oldest) is None
     late = seen.problem(0.12 + seen.oldest + 0.01)
-    assert late is not None
     assert f"accepted: at most {1e3 * seen.oldest:.0f} ms" in late
     assert seen.oldest == pytest.approx(CAMERA.latency_range_s[1] + 1 / CAMERA.rate_hz + 0.05)
 
@@ -63,7 +62,6 @@ def test_an_image_that_cannot_be_believed_is_named_at_once_and_forgiven_later(fr
     seen = see(SeenImages(CAMERA), [Frame(0.0, image())], 0.0)
     bad = see(seen, [frame], 0.1)
     problem = bad.problem(0.1)
-    assert problem is not None
     assert problem.startswith("image 'image_0': ")
     assert said in problem
     assert see(bad, [Frame(0.11, image())], 0.11).problem(0.11) is None
@@ -100,7 +98,6 @@ def test_a_camera_that_hangs_upside_down_sees_farther_than_the_ground(height: fl
     assert right.problem(now) is None
     assert near.problem(now) is None
     problem = wrong.problem(now)
-    assert problem is not None
     assert "sees farther than the ground (upside down?)" in problem
     # nothing is said by a vehicle that turns, that is on the ground, or whose pose is not known
     spinning = dataclasses.replace(level(height), body_rate=np.array([3.0, 0, 0]))

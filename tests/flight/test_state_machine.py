@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from e2efly.flight.pilot.fence import fence_problem, moved, stopping
 from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
@@ -49,6 +50,12 @@ def flown(flight: Flight, inputs: Inputs, seconds: float = DT, settings: FlightS
     return flight
 
 
+def reached(mode: Mode, flight: Flight, inputs: Inputs, *more: Any, **named: Any) -> Flight:
+    flight = flown(flight, inputs, *more, **named)
+    assert flight.mode is mode
+    return flight
+
+
 def ready() -> Flight:
     flight = flown(Flight(), GOOD)
     assert flight.reasons == (Reason.WAITING,)
@@ -56,33 +63,25 @@ def ready() -> Flight:
 
 
 def taking_off() -> Flight:
-    flight = flown(ready(), having(pilot=HOVER))
-    assert flight.mode is Mode.TAKEOFF
-    return flight
+    return reached(Mode.TAKEOFF, ready(), having(pilot=HOVER))
 
 
 UP = having(pilot=HOVER, odometry=at(1.05))
 
 
 def hovering() -> Flight:
-    flight = flown(taking_off(), UP, 6.0)
-    assert flight.mode is Mode.HOVER
-    return flight
+    return reached(Mode.HOVER, taking_off(), UP, 6.0)
 
 
 AWAY = having(UP, pilot=POLICY)
 
 
 def policy_flying() -> Flight:
-    flight = flown(hovering(), AWAY)
-    assert flight.mode is Mode.POLICY
-    return flight
+    return reached(Mode.POLICY, hovering(), AWAY)
 
 
 def landing() -> Flight:
-    flight = flown(hovering(), having(UP, pilot=LAND))
-    assert flight.mode is Mode.LAND
-    return flight
+    return reached(Mode.LAND, hovering(), having(UP, pilot=LAND))
 
 
 BLIND = having(UP, odometry_problem="too old")
@@ -97,15 +96,11 @@ def sinking() -> Flight:
 
 
 def with_pilot() -> Flight:
-    flight = flown(hovering(), having(UP, override=False))
-    assert flight.mode is Mode.PILOT
-    return flight
+    return reached(Mode.PILOT, hovering(), having(UP, override=False))
 
 
 def done() -> Flight:
-    flight = flown(landing(), having(pilot=LAND), 6.0)
-    assert flight.mode is Mode.DONE
-    return flight
+    return reached(Mode.DONE, landing(), having(pilot=LAND), 6.0)
 
 
 def said(flight: Flight, reason: Reason) -> bool:
@@ -127,8 +122,7 @@ def kept_out(**changes: Any) -> Callable[[], Flight]:
     """A policy that is asked for with something amiss: it does not begin, and one that flies ends in a hover."""
 
     def run() -> Flight:
-        flight = flown(hovering(), having(AWAY, **changes), settings=ELSEWHERE)
-        assert flight.mode is Mode.HOVER
+        flight = reached(Mode.HOVER, hovering(), having(AWAY, **changes), settings=ELSEWHERE)
         stopped = flown(policy_flying(), having(AWAY, **changes), settings=ELSEWHERE)
         assert stopped.mode is Mode.HOVER and stopped.lock
         assert {why.split(":")[0] for why in flight.reasons} == {why.split(":")[0] for why in stopped.reasons}
@@ -139,8 +133,7 @@ def kept_out(**changes: Any) -> Callable[[], Flight]:
 
 def landed_from(begin: Callable[[], Flight], **changes: Any) -> Callable[[], Flight]:
     def run() -> Flight:
-        flight = flown(begin(), having(UP, **changes))
-        assert flight.mode is Mode.LAND
+        flight = reached(Mode.LAND, begin(), having(UP, **changes))
         return flight
 
     return run
@@ -269,13 +262,10 @@ def test_a_whole_flight() -> None:
     assert (flight.mode, flight.target) == (Mode.HOVER, Target((0.0, 0.0, 1.05), 0.0))
     flight = flown(flown(flight, UP), AWAY)
     assert flight.mode is Mode.POLICY  # the switch has left its position: it may fly again
-    flight = flown(flight, having(UP, pilot=LAND), 3 * DT)
-    assert flight.mode is Mode.LAND
-    flight = flown(flight, having(odometry=at(0.05)), 6.0)
-    assert flight.mode is Mode.DONE
+    flight = reached(Mode.LAND, flight, having(UP, pilot=LAND), 3 * DT)
+    flight = reached(Mode.DONE, flight, having(odometry=at(0.05)), 6.0)
     assert flown(flight, having(pilot=HOVER), 1.0).mode is Mode.DONE  # until disarmed
-    flight = flown(flight, having(armed=False, pilot=HOVER))
-    assert flight.mode is Mode.INIT
+    flight = reached(Mode.INIT, flight, having(armed=False, pilot=HOVER))
     assert flown(flight, having(pilot=HOVER), 1.0).mode is Mode.INIT  # the switch was not low since
     assert flown(flown(flight, GOOD), having(pilot=HOVER)).mode is Mode.TAKEOFF
 
@@ -306,7 +296,6 @@ def test_the_target_rises_to_the_height_and_slows_down_before() -> None:
     flight, heights, climbs = taking_off(), [], []
     while flight.mode is Mode.TAKEOFF:
         target = flight.target
-        assert target is not None
         heights.append(target.position[2])
         climbs.append(target.climb)
         flight = flown(flight, having(pilot=HOVER, odometry=at(target.position[2])))
@@ -345,7 +334,6 @@ def test_a_policy_that_lands_may_go_under_the_floor_of_the_fence() -> None:
 def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
     flight = landing()
     later = flown(flight, having(UP, pilot=LAND), 1.0)
-    assert flight.target is not None and later.target is not None
     assert later.target.position[2] == pytest.approx(flight.target.position[2] - SETTINGS.land_speed)
     assert later.target.climb == -SETTINGS.land_speed
     # nobody comes back from a landing by the mission switch
@@ -364,7 +352,6 @@ def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
 def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() -> None:
     fast = having(odometry=at(1.0, velocity=(2.0, 0, 0)), pilot=None)
     flight = flown(policy_flying(), having(AWAY, pilot=None, odometry=fast.odometry))
-    assert flight.target is not None
     assert flight.target.position[0] == pytest.approx(2.0 * 0.15 + 2.0**2 / (2 * 6.0))
     waiting = flown(flight, fast, 1.0)  # first it stops, then it sinks
     assert waiting.target is not None and waiting.target.position[2] == 1.0 and waiting.target.climb == 0.0
@@ -390,8 +377,7 @@ def test_odometry_that_leads_astray_is_not_believed_again_before_the_vehicle_sta
     for begin in (lambda: flown(taking_off(), UP), lambda: flown(landing(), having(UP, pilot=LAND))):
         assert flown(begin(), spiral).misled
     assert flown(astray, UP, 0.5).blind  # not even back at its target
-    by_hand = flown(astray, having(spiral, override=False))
-    assert by_hand.mode is Mode.PILOT
+    by_hand = reached(Mode.PILOT, astray, having(spiral, override=False))
     assert flown(by_hand, spiral).blind  # handed over in the air
     stands = flown(by_hand, having(spiral, override=False, odometry=at(x=1.6)), 0.1)
     assert flown(stands, having(odometry=at(x=1.6))).mode is Mode.INIT
@@ -551,8 +537,7 @@ def test_poses_that_contradict_the_sensors_count_as_lost() -> None:
 
 def test_a_blind_landing_ends_for_good() -> None:
     """A vehicle that may lie on its side must not start its motors because it is seen again."""
-    over = flown(sinking(), DEAF, blind_time(1.0) + 0.1)
-    assert over.mode is Mode.DONE
+    over = reached(Mode.DONE, sinking(), DEAF, blind_time(1.0) + 0.1)
     assert flown(over, UP, 1.0).mode is Mode.DONE
 
 
@@ -560,15 +545,8 @@ def test_a_blind_landing_ends_for_good() -> None:
 def test_nothing_has_landed_while_the_accelerometer_shows_that_it_flies(seen: Inputs) -> None:
     """Whatever the poses say, and whatever time has passed: they may be those of another vehicle."""
     begun = sinking() if seen is BLIND else landing()
-    flies = flown(begun, having(seen, stands=False), 60.0)
-    assert flies.mode is Mode.LAND
+    flies = reached(Mode.LAND, begun, having(seen, stands=False), 60.0)
     assert flown(flies, having(seen, stands=True), 6.0).mode is Mode.DONE
-
-
-def test_a_blind_landing_whose_accelerometer_is_not_sure_waits_long_but_not_for_ever() -> None:
-    begun, longest = sinking(), 2 * blind_time(1.0) + BEYOND_S
-    assert flown(begun, BLIND, longest - 0.2).mode is Mode.LAND
-    assert flown(begun, BLIND, longest + 0.2).mode is Mode.DONE
 
 
 def test_a_landing_from_high_above_is_over_soon_and_arrives_slowly() -> None:
@@ -586,19 +564,21 @@ def test_a_landing_from_high_above_is_over_soon_and_arrives_slowly() -> None:
     assert min(climb for _, climb in steps) >= -FAST
 
 
-@pytest.mark.parametrize("odometry", [None, dataclasses.replace(at(), position=np.full(3, math.nan))])
-def test_a_blind_landing_from_an_unknown_height_lasts_as_from_the_top_of_the_fence(odometry: Odometry | None) -> None:
-    lost, flight = having(UP, odometry=odometry, deaf=True), hovering()
-    longest = blind_time(SETTINGS.fence.high[2] - flight.home)
-    assert flown(flight, lost, longest - 0.2).mode is Mode.LAND
-    assert flown(flight, lost, longest + 0.2).mode is Mode.DONE
+TOP = blind_time(SETTINGS.fence.high[2] - hovering().home)
+CLIMBING = having(DEAF, odometry=at(1.05, velocity=(0, 0, 4.0)))
+LOST: dict[str, tuple[Callable[[], Flight], Inputs, float]] = {
+    "whose accelerometer is not sure": (sinking, BLIND, 2 * blind_time(1.0) + BEYOND_S),
+    "from an unknown height": (hovering, having(DEAF, odometry=None, odometry_problem=None), TOP),
+    "from a height that is no number": (hovering, having(DEAF, odometry=at(math.nan), odometry_problem=None), TOP),
+    "that begins in a climb": (lambda: flown(hovering(), CLIMBING), CLIMBING, blind_time(1.0, 4.0)),
+}
 
 
-def test_a_blind_landing_that_begins_in_a_climb_is_given_the_way_up_and_down_again() -> None:
-    climbing = having(DEAF, odometry=at(1.05, velocity=(0, 0, 4.0)))
-    flight = flown(hovering(), climbing)
-    assert flown(flight, climbing, blind_time(1.0, 4.0) - 0.2).mode is Mode.LAND
-    assert flown(flight, climbing, blind_time(1.0, 4.0) + 0.2).mode is Mode.DONE
+@pytest.mark.parametrize("name", LOST)
+def test_a_blind_landing_is_given_its_time_and_no_more(name: str) -> None:
+    begin, lost, longest = LOST[name]
+    assert flown(begin(), lost, longest - 0.2).mode is Mode.LAND
+    assert flown(begin(), lost, longest + 0.2).mode is Mode.DONE
 
 
 def test_the_link_alone_lands_with_odometry_and_disarming_counts_when_heard() -> None:
@@ -637,13 +617,11 @@ class TestHandingOver:
         by_hand = having(UP, override=False)
         flight = flown(begin(), having(override=False), 0.5)
         assert flight.mode is begin().mode  # standing: it stays
-        flight = flown(flight, by_hand)
-        assert flight.mode is Mode.PILOT
+        flight = reached(Mode.PILOT, flight, by_hand)
         assert flown(flight, UP).mode is Mode.HOVER
 
     def test_a_bridge_that_starts_in_flight_lets_the_pilot_fly(self) -> None:
-        flight = flown(Flight(home=SETTINGS.ground_height), having(UP, override=False))
-        assert flight.mode is Mode.PILOT
+        reached(Mode.PILOT, Flight(home=SETTINGS.ground_height), having(UP, override=False))
 
     def test_a_table_is_no_flight(self) -> None:
         table = having(odometry=at(0.9), armed=False, override=False)
@@ -667,7 +645,6 @@ def test_sticks_move_the_hover_in_the_heading_of_the_vehicle_and_no_farther_than
     flight = hovering()
     for _ in range(100):
         flight = flown(flight, having(UP, pilot=Pilot(Mission.HOVER, pitch=1.0, throttle=1.0)), 0.1, ELSEWHERE)
-    assert flight.target is not None
     assert flight.target.position == (SETTINGS.fence.high[0], 0.0, SETTINGS.fence.high[2])
 
 
@@ -758,25 +735,9 @@ def test_who_cannot_stop_inside_is_sent_back(height: float, climb: float) -> Non
 @hypothesis_settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
 def test_heading_and_tilt(yaw: float, pitch: float, roll: float) -> None:
-    def turn(angle: float, axis: int) -> np.ndarray:
-        c, s = math.cos(angle), math.sin(angle)
-        i, j = [(1, 2), (2, 0), (0, 1)][axis]
-        R = np.eye(3)
-        R[i, i] = R[j, j] = c
-        R[j, i], R[i, j] = s, -s
-        return R
-
-    def half(angle: float, axis: int) -> np.ndarray:
-        q = np.array([math.cos(angle / 2), 0.0, 0.0, 0.0])
-        q[1 + axis] = math.sin(angle / 2)
-        return q
-
-    def compose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
-
-    q = compose(compose(half(yaw, 2), half(pitch, 1)), half(roll, 0))
-    R = turn(yaw, 2) @ turn(pitch, 1) @ turn(roll, 0)
-    assert tilt_of(q) == pytest.approx(math.acos(max(-1.0, min(1.0, R[2, 2]))), abs=1e-6)
+    turned = Rotation.from_euler("ZYX", [yaw, pitch, roll])
+    q = turned.as_quat(scalar_first=True)
+    assert tilt_of(q) == pytest.approx(math.acos(max(-1.0, min(1.0, turned.apply([0, 0, 1])[2]))), abs=1e-6)
     assert math.cos(yaw_of(q) - yaw) == pytest.approx(1.0)
 
 
@@ -974,7 +935,6 @@ def test_a_take_off_that_does_not_lift_ends_soon(stands: bool | None, ends: bool
 @pytest.mark.parametrize("deaf", [True, False])
 def test_the_clock_of_a_blind_landing_stands_while_the_controller_flies_its_failsafe(deaf: bool) -> None:
     """It may climb: motors that stop when its receiver comes back would stop high above the ground."""
-    flight = flown(sinking(), having(DEAF if deaf else BLIND, failsafe=True), 30.0)
-    assert flight.mode is Mode.LAND
+    flight = reached(Mode.LAND, sinking(), having(DEAF if deaf else BLIND, failsafe=True), 30.0)
     assert flown(flight, having(DEAF), 0.5).mode is Mode.LAND
     assert flown(flight, having(DEAF), 20.0).mode is Mode.DONE

@@ -7,14 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from e2efly.flight.betaflight import mode_slots, settings_messages
-from e2efly.flight.betaflight.controller import ControllerInfo
-from e2efly.flight.betaflight.messages import BuildInfo, Name
+from e2efly.flight.betaflight import settings_messages
+from e2efly.flight.betaflight.client import Client
+from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.rates import RateProfile
 from e2efly.flight.betaflight.settings_messages import RcTuning
 from e2efly.flight.betaflight.sticks import Sticks, sticks_of
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
-from tests.flight.msp_golden import GOLDEN, REPLIES, payload
+from tests.flight.msp_golden import GOLDEN, payload
+from tests.flight.test_msp_client import Wire
+from tests.flight.test_msp_client import recorded as reply_of
 
 LINEAR = RateProfile("ACTUAL", (67, 67, 67), (67, 67, 67), (0, 0, 0))
 AETR = (0, 1, 3, 2, 4, 5, 6, 7)
@@ -22,23 +24,15 @@ STICKS = Sticks(LINEAR, ThrottleCurve(hover=50, min_check=1050), AETR)
 TOP = math.radians(670)
 
 
-def recorded() -> ControllerInfo:
-    def read(kind: type) -> object:
-        return kind.parse(payload(REPLIES[1][kind.CODE]))
+class Answering(Wire):
+    """A link whose other end is the recorded controller."""
 
-    tuning, rx = read(RcTuning), read(settings_messages.RxConfig)
-    return ControllerInfo(
-        variant="BTFL", version=(4, 6, 0), api=(1, 47), built=read(BuildInfo).built, craft=read(Name).name,
-        features=read(settings_messages.FeatureConfig).features, rate_profile=0, rates=tuning.rates,
-        throttle=replace(tuning.throttle, min_check=rx.min_check), rx=rx, rx_map=read(settings_messages.RxMap),
-        deadband=read(settings_messages.RcDeadband), failsafe=read(settings_messages.FailsafeConfig),
-        rx_fail=read(settings_messages.RxFailConfig),
-        modes=mode_slots.mode_ranges(read(mode_slots.ModeRanges), read(mode_slots.ModeLogic)),
-        box_ids=read(mode_slots.BoxIds).ids, motor=read(settings_messages.MotorConfig),
-        pid_advanced=read(settings_messages.PidAdvanced),
-        mixer=read(settings_messages.MixerConfig),
-        alignment=read(settings_messages.BoardAlignment),
-    )  # fmt: skip
+    def send(self, data: bytes) -> None:
+        self.inbox += b"".join(reply_of(frame.code) for frame in self.decoder.feed(data))
+
+
+def recorded() -> ControllerInfo:
+    return identify(Client(Answering()))
 
 
 def test_signs_order_and_scale() -> None:

@@ -267,7 +267,6 @@ def test_what_passes_has_nothing_harmful_on_under_override(slots: list[ModeRange
     moved = {slot.aux for slot in held} | {3, 4, 5, 6, 7}
     harmful = [slot for slot in info.modes if slot.box not in (ARM, OVERRIDE, *HARMLESS)]
     angle = angle_range(info)
-    assert angle is not None
     free = [
         [pulse for pulse in range(1000, 2000, 25) if not any(s.aux == aux and s.low <= pulse < s.high for s in harmful)]
         for aux in range(14)

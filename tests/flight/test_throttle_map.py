@@ -151,19 +151,17 @@ def test_a_voltage_that_is_lost_counts_as_the_last() -> None:
         assert update(known, 0.4, 10.0, lost, 0.02).last_voltage == 3.6
 
 
-@pytest.mark.parametrize("force", NONSENSE)
-def test_a_force_that_cannot_be_is_not_learned_from(force: float) -> None:
-    assert update(NEW, 0.4, force, 3.9, 0.02) is NEW
-
-
-@pytest.mark.parametrize("dt", [0.0, -0.02, math.nan, math.inf])
-def test_a_time_that_cannot_be_is_not_learned_from(dt: float) -> None:
-    assert update(NEW, 0.4, 10.0, 3.9, dt) is NEW
-
-
-@pytest.mark.parametrize("throttle", [math.nan, 0.0])
-def test_no_throttle_is_not_learned_from(throttle: float) -> None:
-    assert update(NEW, throttle, 10.0, 3.9, 0.02) is NEW
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("force", force) for force in NONSENSE), *(("dt", dt) for dt in (0.0, -0.02, math.nan, math.inf)),
+        ("throttle", math.nan), ("throttle", 0.0),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_not_learned_from(name: str, value: float) -> None:
+    good = {"throttle": 0.4, "force": 10.0, "voltage": 3.9, "dt": 0.02}
+    assert update(NEW, **good) is not NEW
+    assert update(NEW, **good | {name: value}) is NEW
 
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(0, 30)
@@ -218,18 +216,20 @@ class TestSaved:
         with pytest.raises(ValueError, match=f"throttle map: {name} is .*; accepted: "):
             from_json(text, VEHICLE)
 
-    @pytest.mark.parametrize("text", ["", "{", "[]", "{}", "null", "[" * 100_000, '{"scale": 1.0}'])
-    def test_what_is_no_map_is_refused(self, text: str) -> None:
-        with pytest.raises(ValueError, match="throttle map: "):
+    @pytest.mark.parametrize(
+        ("text", "told"),
+        [
+            *((text, "") for text in ("", "{", "[]", "{}", "null", "[" * 100_000, '{"scale": 1.0}')),
+            (
+                as_json(NEW).replace('"scale": 1.0', '"scale": 1.0, "scale": 1.5'),
+                "not JSON: key .scale. is there twice",
+            ),
+            (json.dumps(json.loads(as_json(NEW)) | {"mass": 1.0}), "it has .*mass"),
+        ],
+    )
+    def test_what_is_no_map_is_refused(self, text: str, told: str) -> None:
+        with pytest.raises(ValueError, match=f"throttle map: {told}"):
             from_json(text, VEHICLE)
-
-    def test_a_key_that_is_there_twice_is_refused(self) -> None:
-        with pytest.raises(ValueError, match=r"throttle map: not JSON: key .scale. is there twice"):
-            from_json(as_json(NEW).replace('"scale": 1.0', '"scale": 1.0, "scale": 1.5'), VEHICLE)
-
-    def test_an_unknown_key_is_refused(self) -> None:
-        with pytest.raises(ValueError, match=r"throttle map: it has .*mass"):
-            from_json(json.dumps(json.loads(as_json(NEW)) | {"mass": 1.0}), VEHICLE)
 
 
 def test_the_history_gives_the_mean_over_a_stretch_and_forgets() -> None:

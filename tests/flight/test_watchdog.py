@@ -28,6 +28,7 @@ from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
 from e2efly.flight.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, DescentPlan, WatchedLink, descent
 from tests.faults.virtual_watchdog import VirtualWatchdog
+from tests.flight.test_msp_client import Wire
 from tests.waiting import running, until
 
 RATES = tuple(0.5 * i for i in range(-8, 9))
@@ -64,14 +65,14 @@ class TestDescent:
         narrow = dataclasses.replace(PLAN, rates=(-1.0, 1.0), pulses=((1400, 1600),) * 3)
         assert descent(narrow, 0.0, Attitude(3.0, -3.0, 0.0))[:2] == [1400, 1600]  # never beyond the table
 
-    @pytest.mark.parametrize(
-        ("elapsed", "pulse"), [(0.0, 1400), (0.1499, 1400), (0.15, 1450), (0.29, 1450), (0.3, 1000), (99.0, 1000)]
-    )
-    def test_the_throttle_follows_its_times_and_ends_closed(self, elapsed: float, pulse: int) -> None:
-        assert descent(PLAN, elapsed, None)[2] == pulse
-
-    def test_a_throttle_that_begins_later_holds_its_first_before(self) -> None:
-        assert descent(dataclasses.replace(PLAN, throttle=((0.5, 1300),)), 0.0, None)[2] == 1300
+    def test_the_throttle_follows_its_times_and_ends_closed(self) -> None:
+        for elapsed, pulse in ((0.0, 1400), (0.1499, 1400), (0.15, 1450), (0.29, 1450), (0.3, 1000), (99.0, 1000)):
+            assert descent(PLAN, elapsed, None)[2] == pulse
+        for throttle, pulse in (
+            (((0.5, 1300),), 1300),  # before the first, the first is held
+            (((0.0, 1300), (0.0, 1400)), 1400),  # of steps at one time the last counts
+        ):
+            assert descent(dataclasses.replace(PLAN, throttle=throttle), 0.0, None)[2] == pulse
 
     @pytest.mark.parametrize(
         ("name", "value"),
@@ -85,9 +86,6 @@ class TestDescent:
     def test_a_plan_that_cannot_be_flown_is_refused(self, name: str, value: object) -> None:
         with pytest.raises(ValueError, match=f"plan: {name} is "):
             dataclasses.replace(PLAN, **{name: value})
-
-    def test_of_steps_of_the_throttle_at_one_time_the_last_counts(self) -> None:
-        assert descent(dataclasses.replace(PLAN, throttle=((0.0, 1300), (0.0, 1400))), 0.0, None)[2] == 1400
 
     def test_a_throttle_that_is_no_pulse_is_refused(self) -> None:
         with pytest.raises(ValueError, match="plan: channels"):
@@ -138,6 +136,11 @@ class Controller:
 
     def count(self) -> int:
         return len(self.sticks)
+
+    def wait_for(self, more: int) -> None:
+        """Until so many more have come."""
+        count = self.count()
+        until(lambda: self.count() > count + more)
 
     def _serve(self) -> None:
         peer, decoder = None, Decoder()
@@ -213,8 +216,13 @@ class Flying:
             [sys.executable, "-c", BRIDGE, controller.target, json.dumps(STEADY), json.dumps(asdict(plan))],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True,
         )  # fmt: skip
-        assert self.process.stdout is not None
         self.watchdog = int(self.process.stdout.readline())
+
+    def struck(self, number: signal.Signals) -> float:
+        """When the bridge's process got a signal, s."""
+        since = time.monotonic()
+        self.process.send_signal(number)
+        return since
 
     def close(self) -> None:
         for pid in (self.process.pid, self.watchdog):
@@ -237,15 +245,18 @@ def fly(controller: Controller) -> Iterator[Callable[..., Flying]]:
         flight.close()
 
 
-def check_landing(controller: Controller, since: float, capsys: pytest.CaptureFixture[str]) -> None:
+def watched(controller: Controller) -> WatchedLink:
+    link = WatchedLink(controller.target)
+    until(lambda: link.poll(0.0) or link.alive)
+    return link
+
+
+def check_landing(controller: Controller, since: float) -> None:
     """It levels by the attitude, descends by the plan, and ends with the throttle closed."""
     until(lambda: controller.count() and controller.sticks[-1][1][2] == 1000)
     until(lambda: controller.sticks[-1][0] - since > 1.0)
     mine = [(at, row) for at, row in controller.sticks if row != STEADY and at >= since]
-    reaction = mine[0][0] - since
-    with capsys.disabled():
-        print(f" [{1e3 * reaction:.0f} ms]", end="")
-    assert reaction < REACTION
+    assert mine[0][0] - since < REACTION
     assert max(at for at, row in controller.sticks if row == STEADY) < mine[0][0]  # nobody else speaks
     throttles = [pulse for pulse, _ in itertools.groupby(row[2] for _, row in mine)]
     assert throttles == [1400, 1450, 1000]
@@ -283,24 +294,13 @@ def test_a_target_that_is_no_link_is_refused_at_once() -> None:
         WatchedLink("udp:nowhere")
 
 
-def test_a_bridge_that_is_killed_in_flight(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
-) -> None:
-    flight = fly()
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
-
-
 def test_a_bridge_that_hangs_in_flight_and_is_told_when_it_goes_on(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
+    controller: Controller, fly: Callable[..., Flying]
 ) -> None:
     flight = fly()
-    since = time.monotonic()
-    flight.process.send_signal(signal.SIGSTOP)
-    check_landing(controller, since, capsys)
+    since = flight.struck(signal.SIGSTOP)
+    check_landing(controller, since)
     flight.process.send_signal(signal.SIGCONT)
-    assert flight.process.stdout is not None
     said = flight.process.stdout.readline()
     assert re.match(r"False the watchdog has taken over: the bridge was silent for 1\.\d+ s", said)
     assert all(row != STEADY for at, row in controller.sticks if at > since + REACTION)  # and it stays out of it
@@ -331,28 +331,22 @@ def test_a_bridge_that_hangs_on_the_ground_is_waited_for(controller: Controller,
     flight.process.send_signal(signal.SIGSTOP)
     time.sleep(1.5)
     flight.process.send_signal(signal.SIGCONT)
-    count = controller.count()
-    until(lambda: controller.count() > count + 10)
+    controller.wait_for(10)
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
-@pytest.mark.whole(but=1)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_no_signal_ends_it_in_flight(
-    number: signal.Signals, controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
+@pytest.mark.whole(but=2)
+@pytest.mark.parametrize("number", [0, signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_bridge_that_is_killed_in_flight_is_landed_for_and_no_signal_ends_that(
+    number: int, controller: Controller, fly: Callable[..., Flying]
 ) -> None:
     flight = fly()
-    os.kill(flight.watchdog, number)
-    count = controller.count()
-    until(lambda: controller.count() > count + 10)
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
+    os.kill(flight.watchdog, number)  # 0: none
+    controller.wait_for(10)
+    check_landing(controller, flight.struck(signal.SIGKILL))
 
 
-def test_a_terminal_that_takes_nothing_does_not_hold_it_up(
-    controller: Controller, fly: Callable[..., Flying], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_terminal_that_takes_nothing_does_not_hold_it_up(controller: Controller, fly: Callable[..., Flying]) -> None:
     """As when the terminal is paused or gone: whatever the watchdog has to say, it flies first."""
     out, end = os.pipe()
     os.set_blocking(end, False)
@@ -360,18 +354,14 @@ def test_a_terminal_that_takes_nothing_does_not_hold_it_up(
         while True:
             os.write(end, b"." * 65536)
     os.set_blocking(end, True)
-    flight = fly(stderr=end)
-    since = time.monotonic()
-    flight.process.kill()
-    check_landing(controller, since, capsys)
+    check_landing(controller, fly(stderr=end).struck(signal.SIGKILL))
     os.close(out)
     os.close(end)
 
 
 def test_a_watchdog_that_dies_is_seen_as_a_lost_link_and_leaves_nothing_behind(controller: Controller) -> None:
     before = set(Path("/proc/self/fd").iterdir())
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     os.kill(link._process.pid, signal.SIGKILL)
     until(lambda: link.poll(0.0) or not link.alive)
     assert link.reason == "the watchdog process has ended" and not link.taken_over
@@ -386,8 +376,7 @@ def test_a_watchdog_that_dies_is_seen_as_a_lost_link_and_leaves_nothing_behind(c
 
 
 def test_a_watchdog_that_hangs_never_blocks_the_bridge(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     os.kill(link._process.pid, signal.SIGSTOP)
     for _ in range(3000):
         link.send(bytes(1000))
@@ -400,8 +389,7 @@ def test_a_link_that_is_cut_comes_back_in_the_same_flight(controller: Controller
     fly()
     controller.drop.set()
     until(lambda: controller.accepted == 2)
-    count = controller.count()
-    until(lambda: controller.count() > count + 20)
+    controller.wait_for(20)
     assert {row for _, row in controller.sticks} == {STEADY}
 
 
@@ -416,8 +404,7 @@ def test_a_link_that_is_cut_during_the_landing_comes_back(controller: Controller
 
 
 def test_the_bridge_hears_of_a_lost_link(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     controller.drop.set()
     until(lambda: link.poll(0.0) or not link.alive)
     assert "closed the connection" in link.reason
@@ -427,23 +414,22 @@ def test_the_bridge_hears_of_a_lost_link(controller: Controller) -> None:
 
 
 def test_a_plan_that_cannot_be_read_leaves_the_last_one(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
-    until(lambda: link.poll(0.0) or link.alive)
+    link = watched(controller)
     link.plan(PLAN)
     for content in (b"Pgarbage", b"P{}", b"P[]", b"P\xff", b'P{"pulses": 5}', b"?"):
         link._hand(content)
     until(lambda: link.poll(0.0) or link.taken_over)  # the bridge, silent, is taken for hung: it lands by the plan
-    until(lambda: controller.count() and controller.sticks[-1][1][2] == 1400)
+    until(lambda: 1400 in [row[2] for _, row in controller.sticks])
     os.kill(link._process.pid, signal.SIGKILL)
     link.close()
 
 
-class Told:
+class Told(Wire):
     """A link to a controller that says whether it is armed, and the time that passes with each round."""
 
     def __init__(self, armed: Callable[[float], bool | None]) -> None:
-        self.armed, self.now, self.sticks, self.pending = armed, 0.0, [], b""
-        self.closed, self.alive = False, True
+        super().__init__()
+        self.armed, self.now, self.sticks, self.closed = armed, 0.0, [], False
 
     def monotonic(self) -> float:
         return self.now
@@ -451,20 +437,13 @@ class Told:
     def sleep(self, seconds: float) -> None:
         self.now += seconds
 
-    def poll(self, now: float) -> None:
-        pass
-
     def send(self, data: bytes) -> None:
-        for frame in Decoder().feed(data):
+        for frame in self.decoder.feed(data):
             if frame.code == SET_RAW_RC:
                 self.sticks.append(struct.unpack(f"<{len(frame.payload) // 2}H", frame.payload))
             elif frame.code == StatusEx.CODE and (armed := self.armed(self.now)) is not None:
                 payload = struct.pack("<HHHIBHBBBBIB", 250, 0, 0, int(armed), 0, 0, 4, 0, 0, 29, 0, 0)
-                self.pending += encode(MspFrame(StatusEx.CODE, payload, REPLY))
-
-    def receive(self) -> bytes:
-        data, self.pending = self.pending, b""
-        return data
+                self.inbox += encode(MspFrame(StatusEx.CODE, payload, REPLY))
 
     def close(self) -> None:
         self.closed = True

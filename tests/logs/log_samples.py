@@ -124,7 +124,6 @@ def bag(path: Path, messages: tuple[Message, ...] = FLOWN, count: int = 20, stor
 
 
 def only(folder: Path, ending: str) -> Path:
-    """The one file of a folder with an ending."""
     (found,) = folder.glob(f"*{ending}")
     return found
 
@@ -145,6 +144,18 @@ def blackbox(path: Path, size: int = 9000) -> Path:
     """The beginning of a blackbox that Betaflight's SITL wrote."""
     path.write_bytes(BLACKBOX.read_bytes()[:size])
     return path
+
+
+def fly(log: Telemetry, start: float) -> None:
+    """A fifth of a second of a flight, facing world y and flying along world x, by poses that are 4 ms old."""
+    for i in range(20):
+        now = start + 0.01 * i
+        motion = {"position": [0.1 * i, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5], "body_rate": [0.1, 0.2, 0.3]}
+        log.record("odometry", now, {"age": 0.004, "quaternion": [HALF, 0.0, 0.0, HALF], **motion})
+        log.record("imu", now, {"gyro": [1.0, 2.0, 3.0 + i], "specific_force": [0.0, 0.1, 9.81]})
+        log.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5], "yaw": 0.0})
+        log.record("motors", now, {"values": [0.1, 0.2, 0.3, 0.4]})
+    log.record("battery", start, {"voltage": 15.5, "current": 8.0, "cells": 4})
 
 
 def recorded(path: Path) -> Path:
@@ -178,6 +189,5 @@ TOKENS = (
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
-    """The bytes of each sample, by its name."""
     folder.mkdir(parents=True, exist_ok=True)
     return {name: make(folder).read_bytes() for name, make in SAMPLES.items()}

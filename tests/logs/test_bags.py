@@ -16,23 +16,19 @@ from e2efly.logs.channels import CHANNELS
 from e2efly.logs.flight_log import FlightLog, Series, read_log
 from e2efly.logs.scripts.ros_topics import BODY_FRAME, TOPICS, WORLD_FRAME, into_body
 from e2efly.logs.telemetry import Telemetry
-
-HALF = math.sqrt(0.5)
+from tests.logs.log_samples import HALF, fly
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
-    """Facing world y, so that flying along world x is flying to the right: body -y."""
+    """Flying along world x is flying to the right: body -y."""
     start = time.monotonic()
     path = tmp_path_factory.mktemp("log") / "flight.mcap"
     with Telemetry(path) as telemetry:
+        fly(telemetry, start)
         for i in range(20):
             now = start + 0.01 * i
-            motion = {"position": [0.1 * i, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5], "body_rate": [0.1, 0.2, 0.3]}
-            telemetry.record("odometry", now, {"age": 0.004, "quaternion": [HALF, 0.0, 0.0, HALF], **motion})
-            telemetry.record("imu", now, {"gyro": [1.0, 2.0, 3.0], "specific_force": [0.0, 0.1, 9.81]})
             telemetry.record("imu", now, {"attitude": [0.0, 0.0, 0.1]})
-            telemetry.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5], "yaw": 0.0})
             policy = {
                 "observation": [0.5, None, -2.0],
                 "action": [0.1, -0.2, 0.3, -0.4],
@@ -41,7 +37,6 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
             }
             telemetry.record("policy", now, policy)
             telemetry.record("rc", now, {"channels": [1500, 1000, 2000, 1750]})
-        telemetry.record("battery", start, {"voltage": 15.5, "current": 8.0, "cells": 4})
         change = {"mode": "POLICY", "previous": "HOVER", "reasons": ["switch", "inside its envelope"]}
         telemetry.record("mode", start + 0.1, change)
         telemetry.record("odometry", start + 0.3, {"position": [0.0, float("nan"), 0.0], "age": None})

@@ -17,7 +17,7 @@ from e2efly.logs.mcap_records import MAGIC
 from e2efly.logs.readers import read_flights, read_part
 from e2efly.logs.recording import Record, Stream, stream_table
 from e2efly.logs.telemetry import Telemetry
-from tests.logs.log_samples import HALF, crazyflie, ulog
+from tests.logs.log_samples import HALF, crazyflie, fly, ulog
 
 BLACKBOX = Path(__file__).parent.parent / "data" / "blackbox"
 
@@ -111,17 +111,9 @@ def test_a_wrong_map_of_columns_is_refused(entry: str, told: str) -> None:
 
 @pytest.fixture(scope="module")
 def mcap(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Facing world y and flying along world x; the poses are 4 ms old when they are used."""
     start, path = time.monotonic(), tmp_path_factory.mktemp("log") / "flight.mcap"
     with Telemetry(path) as telemetry:
-        for i in range(20):
-            now = start + 0.01 * i
-            motion = {"position": [0.1 * i, 2.0, 3.0], "velocity": [4.0, 0.0, 0.5], "body_rate": [0.1, 0.2, 0.3]}
-            telemetry.record("odometry", now, {"age": 0.004, "quaternion": [HALF, 0.0, 0.0, HALF], **motion})
-            telemetry.record("imu", now, {"gyro": [1.0, 2.0, 3.0 + i], "specific_force": [0.0, 0.1, 9.81]})
-            telemetry.record("command", now, {"collective_thrust": 12.0, "body_rate": [0.0, -1.0, 0.5]})
-            telemetry.record("motors", now, {"values": [0.1, 0.2, 0.3, 0.4]})
-        telemetry.record("battery", start, {"voltage": 15.5, "current": 8.0, "cells": 4})
+        fly(telemetry, start)
         telemetry.record("battery", start + 0.1, {"voltage": 15.4, "current": 8.0, "cells": 4})
     return path
 

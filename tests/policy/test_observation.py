@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from e2efly.commands.cli import run
-from e2efly.config import EnvConfig, ImuConfig, NetworkConfig
+from e2efly.config import EnvConfig, ImuConfig
 from e2efly.environment import Env, random_key
-from e2efly.learning.networks import Actor, Weights, init_mlp
-from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.policy import observation
 from e2efly.policy.loader import load_policy
 from e2efly.policy.observation import Field, Own
@@ -21,6 +19,7 @@ from e2efly.runs import presets
 from e2efly.tasks.route import course_for
 from e2efly.validation.evaluation import candidate
 from e2efly.vehicles.loading import load_vehicle
+from tests.policy.made import made
 
 HEIGHT = Own(Field("height", 1, "none", "m", 3.0, "height"), lambda known: known.motion.position[..., 2:])
 DRIFT = Own(Field("drift", 1, "none", "rad/s", 4.0, "a rate"), lambda known: known.imu.gyroscope[..., :1], "imu")
@@ -37,13 +36,10 @@ def test_an_entry_is_trained_exported_flown_and_written_as_c(tmp_path: Path, mon
     state, shown = jax.jit(env.reset, static_argnums=1)(random_key(0), 2)
     np.testing.assert_array_equal(shown[:, -10], state.vehicle.position[:, 2])
 
-    file, actor = tmp_path / "policy.onnx", Actor.of(env.fields, (), NetworkConfig((8,)))
-    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 8, 4), 0.1)
-    export_policy(file, Weights((), None, layers), actor, contract_of(env, preset))
+    file = made(tmp_path / "policy.onnx", 0.1, env, preset, hidden=8, hovers=False)
     policy, vehicle = load_policy(file), load_vehicle("vis_r")
     flight = Runtime.of(policy, course_for(policy.contract, vehicle), vehicle, imu=True)
     v, imu = state.vehicle, state.imu
-    assert imu is not None
     at = Odometry(0.0, *(np.asarray(x[1]) for x in (v.position, v.velocity, v.quaternion, v.body_rate)))
     felt = Imu(np.asarray(imu.gyroscope[1]), np.asarray(imu.accelerometer[1]))
     _, decision = act(flight, begin(flight, at, 0.0), at, 0.0, felt)

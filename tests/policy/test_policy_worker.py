@@ -14,10 +14,6 @@ import numpy as np
 import onnx
 import pytest
 
-from e2efly.config import NetworkConfig
-from e2efly.environment import Env
-from e2efly.learning.networks import Actor, Weights, init_mlp
-from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.policy import runtime
 from e2efly.policy import worker as worker_module
 from e2efly.policy.loader import load_policy
@@ -25,9 +21,9 @@ from e2efly.policy.odometry import Odometry
 from e2efly.policy.onnx_file import sealed
 from e2efly.policy.runtime import Runtime
 from e2efly.policy.worker import PolicyWorker
-from e2efly.runs import presets
 from e2efly.tasks.route import course_for
 from e2efly.vehicles.loading import load_vehicle
+from tests.policy.made import made
 from tests.waiting import until
 
 VEHICLE = load_vehicle("vis_r")
@@ -39,13 +35,7 @@ PATIENCE = 10.0
 @pytest.fixture(scope="module")
 def policy_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A policy that about hovers."""
-    config = presets.preset("hover", "ppo")
-    env = Env.of(config.task, config.reward, config.env)
-    actor, path = Actor.of(env.fields, (), NetworkConfig((16,))), tmp_path_factory.mktemp("policy") / "policy.onnx"
-    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 16, 4), 0.05)
-    layers = [*layers[:-1], (np.asarray(layers[-1][0]), np.arctanh(np.asarray(env.hover, np.float32)))]
-    export_policy(path, Weights((), None, layers), actor, contract_of(env, config))
-    return path
+    return made(tmp_path_factory.mktemp("policy") / "policy.onnx", 0.05)
 
 
 def flight(path: Path) -> Runtime:

@@ -17,11 +17,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TaskConfig
+from e2efly.config import EnvConfig, ImuConfig, TaskConfig
 from e2efly.courses.tracks import load_track
 from e2efly.environment import Env, EnvState, random_key
-from e2efly.learning.networks import Actor, Weights, init_mlp
-from e2efly.learning.onnx_export import contract_of, export_policy
+from e2efly.learning.onnx_export import contract_of
 from e2efly.policy.contract import Contract
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.odometry import Odometry
@@ -32,6 +31,7 @@ from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import Route, course_for, fields_of
 from e2efly.tasks.track.goal import TrackRoute
 from e2efly.vehicles.loading import load_vehicle
+from tests.policy.made import made
 
 VEHICLE = load_vehicle("vis_r")
 START = 5000.0
@@ -45,12 +45,7 @@ def make(folder: Path, task: TaskConfig, config: EnvConfig | None = None) -> tup
     preset = presets.preset(task.name, "ppo")
     preset = dataclasses.replace(preset, task=task, env=config or preset.env)
     env = Env.of(task, preset.reward, preset.env)
-    actor, path = Actor.of(env.fields, (), NetworkConfig((16,))), folder / "policy.onnx"
-    layers = init_mlp(np.random.default_rng(0), (actor.features.size, 16, 4), 0.05)
-    hover = np.arctanh(np.asarray(env.hover, np.float32))
-    layers = [*layers[:-1], (np.asarray(layers[-1][0]), hover)]
-    export_policy(path, Weights((), None, layers), actor, contract_of(env, preset))
-    return env, path
+    return env, made(folder / "policy.onnx", 0.05, env, preset)
 
 
 @pytest.fixture(scope="module")
@@ -247,8 +242,6 @@ def test_broken_odometry_is_named(runtime: Runtime, changes: dict[str, Any], mes
 
 
 class Broken:
-    """A session that fails, as ONNX Runtime's does."""
-
     def run(self, *_: Any) -> None:
         raise RuntimeError("bad allocation")
 
@@ -302,20 +295,14 @@ def test_what_cannot_fly_is_refused_by_name(
 
 
 def test_all_reasons_are_given_at_once(policy: Policy) -> None:
-    goal = course_for(policy.contract, VEHICLE)
-    race = make_goal_of_gates()
+    goal, config = course_for(policy.contract, VEHICLE), presets.preset("race", "ppo")
+    race = course_for(contract_of(Env.of(config.task, config.reward, config.env), config), VEHICLE)
     with pytest.raises(
         ValueError, match=r"vehicle 'vis_h' has hash(.|\n)*control_rate is 50(.|\n)*envelope.tilt is -1"
     ):
         Runtime.of(policy, goal, load_vehicle("vis_h"), 50.0, envelope=Envelope(tilt=-1.0))
     with pytest.raises(ValueError, match=r"observation shows .*; accepted: with gates, as its task is 'hover'"):
         Runtime.of(policy, race, VEHICLE)
-
-
-def make_goal_of_gates() -> Any:
-    config = presets.preset("race", "ppo")
-    contract = contract_of(Env.of(config.task, config.reward, config.env), config)
-    return course_for(contract, VEHICLE)
 
 
 def test_a_policy_that_sees_an_imu_needs_its_measurements(tmp_path: Path) -> None:

@@ -20,14 +20,12 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion"
 
 
 def compiler(name: str = "cc") -> str:
-    """Its path."""
     if not (found := shutil.which(name)):
         pytest.fail(f"needs {name} (Debian: apt-get install gcc g++); or E2EFLY_WITHOUT=cc to go without")
     return found
 
 
 def build(out: Path, *arguments: object, name: str = "cc") -> Path:
-    """Compile; what the compiler says against it is told."""
     done = subprocess.run([compiler(name), *map(str, arguments), "-o", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return out
@@ -35,8 +33,6 @@ def build(out: Path, *arguments: object, name: str = "cc") -> Path:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A policy as a library of C."""
-
     contract: Contract
     needs: Sizes
     library: ctypes.CDLL
@@ -49,7 +45,6 @@ class Compiled:
         return self.state.view(np.float32)[: self.contract.memory_size]
 
     def network(self, observation: np.ndarray, images: Sequence[np.ndarray] = ()) -> tuple[int, np.ndarray]:
-        """Status and action of a whole observation."""
         return self._call(self.library.policy_network, observation, images)
 
     def act(self, seen: np.ndarray, images: Sequence[np.ndarray] = ()) -> tuple[int, np.ndarray]:
@@ -57,11 +52,9 @@ class Compiled:
         return self._call(self.library.policy_act, seen, images)
 
     def begin(self) -> None:
-        """The policy takes over."""
         self.library.policy_begin(pointer(self.state))
 
     def command(self, action: np.ndarray) -> np.ndarray:
-        """The command of an action."""
         out = np.empty(4, np.float32)
         self.library.policy_command(pointer(np.ascontiguousarray(action, np.float32)), pointer(out))
         return out
@@ -78,7 +71,6 @@ def pointer(x: np.ndarray) -> ctypes.c_void_p:
 
 
 def compiled(file: Path, folder: Path, precision: Precision = "double", *flags: str) -> Compiled:
-    """Export a policy.onnx and compile it."""
     needs = write_c(folder, file, "policy", precision)
     library = build(folder / "policy.so", *(flags or ("-O2",)), *STRICT, "-shared", "-fPIC", folder / "policy.c", "-lm")
     state = np.zeros(needs.state // 8 + 1).view(np.uint8)

@@ -52,6 +52,15 @@ def both(
     return actions, after
 
 
+def check_exact(policy: Policy, made: Compiled, file: Path, count: int) -> tuple[tuple, tuple]:
+    """Whether actions and memories are the exact ones within 1e-6; inputs and what came of them."""
+    given = inputs(policy, count)
+    wanted, found = Exact(policy.contract, file.read_bytes()).act(*given), both(made, *given)
+    for a, b in zip(found, wanted, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
+    return given, found
+
+
 def without_past(contract: Contract, observation: np.ndarray) -> np.ndarray:
     """What is seen beside the past actions."""
     past = contract.slices["past_actions"]
@@ -64,10 +73,7 @@ def test_each_kind_of_policy_is_the_same_within_1e_6(name: str, tmp_path: Path) 
     """Of its exact value: ONNX Runtime's own actions are up to 3e-6 from that."""
     file = policy_file(name)
     policy, made = load_policy(file), compiled(file, tmp_path)
-    given = inputs(policy, 300)
-    wanted, found = Exact(policy.contract, file.read_bytes()).act(*given), both(made, *given)
-    for a, b in zip(found, wanted, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
+    given, found = check_exact(policy, made, file, 300)
     if name in ("hover", "land_visual"):  # whose ONNX Runtime is within 1e-6, too
         np.testing.assert_allclose(found[0], policy.act(*given)[0], rtol=0, atol=1e-6)
 
@@ -125,10 +131,7 @@ def test_over_real_flights_it_acts_as_the_file_from_its_own_memory(name: str, tm
 def test_all_that_a_training_can_export(cameras: tuple, network: NetworkConfig, tmp_path: Path) -> None:
     file, *_ = exported(tmp_path, cameras, network)
     policy, made = load_policy(file), compiled(file, tmp_path)
-    given = inputs(policy, 50)
-    wanted, found = Exact(policy.contract, file.read_bytes()).act(*given), both(made, *given)
-    for a, b in zip(found, wanted, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
+    check_exact(policy, made, file, 50)
 
 
 @pytest.mark.parametrize("operator", ["Softplus", "LeakyRelu", "Sigmoid", "Identity"])
@@ -232,18 +235,9 @@ def test_it_allocates_nothing_and_keeps_nothing_to_itself(tmp_path: Path) -> Non
     write_c(tmp_path, policy_file("race_clutter"), "policy", "float")
     built = build(tmp_path / "policy.o", "-O2", "-std=c99", "-c", tmp_path / "policy.c")
     symbols = [line.split()[-2:] for line in subprocess.check_output(["nm", built], text=True).splitlines()]
-    assert {name for kind, name in symbols if kind == "U"} <= {
-        "expf",
-        "tanhf",
-        "logf",
-        "sqrtf",
-        "memcpy",
-        "memmove",
-        "memset",
-    }
-    assert {name for kind, name in symbols if kind == "T"} == {
-        f"policy_{x}" for x in ("begin", "act", "network", "command")
-    }
+    needs, gives = ({name for kind, name in symbols if kind == which} for which in "UT")
+    assert needs <= {"expf", "tanhf", "logf", "sqrtf", "memcpy", "memmove", "memset"}
+    assert gives == {f"policy_{x}" for x in ("begin", "act", "network", "command")}
     assert not [name for kind, name in symbols if kind in "bBdDC"]  # no variables, constants alone
 
 

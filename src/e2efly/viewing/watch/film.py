@@ -133,21 +133,21 @@ def _seen(
     soup: Soup, solid: Any, eye: np.ndarray, ray: Float[np.ndarray, "n 3"], ground: bool, pixel: float
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
     """The colours that rays meet, and numbers of what they meet."""
-    seen = np.tile(np.float32(SKY), (len(ray), 1))
+    seen = np.tile(np.asarray(SKY, np.float32), (len(ray), 1))
     far, what = np.full(len(ray), np.inf, np.float32), np.full(len(ray), -1)
     if ground and eye[2] > 0:
         falls = np.flatnonzero(ray[:, 2] < -1e-4)
         far[falls] = -eye[2] / ray[falls, 2]
         place = eye.astype(np.float32) + far[falls, None] * ray[falls]
         lines = _lines(place[:, :2], far[falls], ray[falls], pixel)[:, None]
-        floor = (1 - lines) * np.float32(GROUND) + lines * np.float32(GRID)
+        floor = (1 - lines) * np.asarray(GROUND, np.float32) + lines * np.asarray(GRID, np.float32)
         what[falls] = -2
         if solid is not None:
             dark = np.flatnonzero(solid.blocked(place, np.broadcast_to(SUN, place.shape).astype(np.float32)))
             floor[dark] *= SHADOW
             what[falls[dark]] = -3
         clear = np.exp(-far[falls] / HAZE)[:, None]
-        seen[falls] = clear * floor + (1 - clear) * np.float32(SKY)
+        seen[falls] = clear * floor + (1 - clear) * np.asarray(SKY, np.float32)
     if solid is not None:
         distance, index = solid.first(np.broadcast_to(eye, ray.shape).astype(np.float32), ray)
         near = np.flatnonzero((index >= 0) & (distance < far))
