@@ -15,7 +15,7 @@ REASONS = ("", "mission switch", "reached its height", "mission switch", "missio
            "landed: the ground is felt", "disarmed")  # fmt: skip
 WHOLE = Rehearsal(
     modes=MODES, reasons=REASONS, complete=True, hover_error=0.0312, done=True, success=True, mean_error=0.02,
-    final_error=0.123, final_speed=0.55, top_speed=11.25, arrivals=(), told="touched 12.3 cm off at 0.55 m/s",
+    final_error=0.123, top_speed=11.25, told="touched 12.3 cm off at 0.55 m/s",
     flown=FlownSession(),
 )  # fmt: skip
 CUT = ("settings: feature AIRMODE is off; needed: on: torque goes before thrust at any throttle (feature AIRMODE); "

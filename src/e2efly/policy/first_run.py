@@ -11,19 +11,12 @@ import sys
 import numpy as np
 import onnxruntime
 
-if sys.platform != "win32":  # Windows limits no process in this way; there, the process that waits ends it
-    import resource
-
 
 def main(mib: int, seconds: int) -> None:
     """Load and run the network."""
     given = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)
     content, inputs = given["content"].tobytes(), [given[f"arr_{i}"] for i in range(len(given.files) - 1)]
-    if sys.platform != "win32":
-        _limit(resource.RLIMIT_CPU, seconds)  # also where the process that waits for this one is gone
-    if sys.platform == "linux":
-        with open("/proc/self/statm") as file:  # noqa: PTH123
-            _limit(resource.RLIMIT_AS, int(file.read().split()[0]) * resource.getpagesize() + (mib << 20))
+    _limit(mib, seconds)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
@@ -31,12 +24,21 @@ def main(mib: int, seconds: int) -> None:
     session.run(None, dict(zip([node.name for node in session.get_inputs()], inputs, strict=True)))
 
 
-def _limit(kind: int, most: int) -> None:
-    """Lower a limit of this process."""
-    if sys.platform != "win32":
+def _limit(mib: int, seconds: int) -> None:
+    """Limit this process. Windows has no such limits; there, the process that waits for this one ends it."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    def lower(kind: int, most: int) -> None:
         _, hard = resource.getrlimit(kind)
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(kind, (most, most))
+
+    lower(resource.RLIMIT_CPU, seconds)  # also where the process that waits for this one is gone
+    if sys.platform == "linux":
+        with open("/proc/self/statm") as file:  # noqa: PTH123
+            lower(resource.RLIMIT_AS, int(file.read().split()[0]) * resource.getpagesize() + (mib << 20))
 
 
 if __name__ == "__main__":
