@@ -1,1 +1,1 @@
-"""Onboard: load a policy, check its contract, run it. Imports no JAX and no simulator."""
+"""Flight: from poses, images and a policy to a flight controller. Imports no JAX and no simulator."""

@@ -24,7 +24,7 @@ def first() -> bool:
     return jax.process_index() == 0
 
 
-def whole(tree: Any) -> Any:
+def gather(tree: Any) -> Any:
     """A tree of arrays as NumPy arrays, with the parts held by other processes. Random keys become their numbers."""
 
     def gathered(x: Any) -> np.ndarray:
@@ -38,7 +38,7 @@ def whole(tree: Any) -> Any:
     return jax.tree.map(gathered, tree)
 
 
-def of_first(tree: Any, like: Any) -> Any:
+def broadcast(tree: Any, like: Any) -> Any:
     """The arrays of process 0, in every process.
 
     Args:
@@ -53,17 +53,17 @@ def of_first(tree: Any, like: Any) -> Any:
         numbers = jax.eval_shape(numbers_of, x)
         return np.zeros(numbers.shape, numbers.dtype)
 
-    found = broadcast_one_to_all(whole(tree) if first() else jax.tree.map(empty, like))
+    found = broadcast_one_to_all(gather(tree) if first() else jax.tree.map(empty, like))
     return jax.tree.map(lambda wanted, x: key_of(x) if is_key(wanted) else np.asarray(x), like, found)
 
 
-def told(content: Any) -> Any:
+def broadcast_json(content: Any) -> Any:
     """The JSON content of process 0, in every process."""
     if jax.process_count() == 1:
         return content
     data = np.frombuffer(json.dumps(content).encode(), np.uint8) if first() else np.zeros(0, np.uint8)
-    size = int(of_first(np.int32(data.size), np.int32(0)))
-    return json.loads(bytes(of_first(data, np.zeros(size, np.uint8))))
+    size = int(broadcast(np.int32(data.size), np.int32(0)))
+    return json.loads(bytes(broadcast(data, np.zeros(size, np.uint8))))
 
 
 def any_of(flag: bool) -> bool:

@@ -56,7 +56,7 @@ class Point:
 
     def save(self, path: Path, seed: int) -> None:
         """Write a checkpoint. Process 0 writes the file; all processes contribute their part."""
-        whole = hosts.whole({"state": self.state, "best": self.best})
+        whole = hosts.gather({"state": self.state, "best": self.best})
         if hosts.first():
             about = {**dataclasses.asdict(self.progress), "version": versions()["e2efly"], "seed": seed}
             save_checkpoint(path, whole, about)
@@ -67,7 +67,7 @@ class Point:
         like, loaded, about = _like(setup, parameters), None, None
         if hosts.first():
             loaded, about = load_checkpoint(path, like), read_about(path)
-        loaded, about = hosts.of_first(loaded, like), hosts.told(about)
+        loaded, about = hosts.broadcast(loaded, like), hosts.broadcast_json(about)
         known = {field.name: about[field.name] for field in dataclasses.fields(Progress)}
         if known["best_score"] is None:  # as JSON has no infinities
             known["best_score"] = -math.inf

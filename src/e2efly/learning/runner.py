@@ -105,13 +105,13 @@ def train(
         if not hosts.first():
             _check_same(content, resume)
         else:
-            hosts.told({"resume": resume, "versions": _deciding(versions()), "config": to_json(content)})
+            hosts.broadcast_json({"resume": resume, "versions": _deciding(versions()), "config": to_json(content)})
             _check_folder(run, setup.config, resume, overwrite)
         reporter.compiling()
         parameters = _parameters(setup, run, resume)
         folder = traced_folder(setup.config) if traced and jax.process_count() == 1 else None
         programs = Programs.compile(setup, parameters, folder)
-        if resume and hosts.told(run.checkpoint.exists()):
+        if resume and hosts.broadcast_json(run.checkpoint.exists()):
             point = Point.resumed(run.checkpoint, setup, parameters)
         else:
             state = programs.begin(setup.env, parameters, random_key(setup.config.seed))
@@ -286,7 +286,7 @@ def _deciding(versions: dict[str, str]) -> dict[str, str | None]:
 
 def _check_same(config: TrainConfig, resume: bool) -> None:
     """Refuse anything that differs from process 0. Files are compared by their content."""
-    wanted = hosts.told(None)
+    wanted = hosts.broadcast_json(None)
     different = list(different_values(wanted["versions"], _deciding(versions())))
     if not different:  # versions may differ in what can be configured
         different = list(differences(from_json(wanted["config"], "process 0"), config))

@@ -1,4 +1,4 @@
-"""The filter as the bridge uses it, with the command and odometry types of the rest of `deploy`."""
+"""The filter as the bridge uses it, with the command and odometry types of the rest of `flight`."""
 
 import math
 from dataclasses import dataclass
