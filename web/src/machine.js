@@ -1,4 +1,4 @@
-// Runs the programs that Python makes of the policy and of the environment's own step (e2efly/web/machine.py).
+// Runs the programs that Python makes of the policy and of the environment's own step (viewing/web/machine.py).
 
 /** @typedef {object} Program As exported.
  * @property {string} constants base64 of float64, the first numbers of the memory
