@@ -3,13 +3,13 @@
 import contextlib
 import io
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, get_args
 
 import tyro
 
+from e2efly.commands.cli import COMMANDS
 from e2efly.commands.helping import NAMES
 from e2efly.commands.options import of_command
 from e2efly.config import ALGORITHMS
@@ -62,13 +62,13 @@ def run(options: Completion) -> int:
 def script(shell: Shell) -> str:
     """The script for a shell. It is made from the commands' own options, and runs nothing of e2efly itself."""
     values, options = list[str](), list[str]()
-    for command in sorted(_commands()):
+    for command in sorted(COMMANDS):
         every = _options(command)
         named = _NAMED | {option: words for option, words in every.items() if words}
         values += [_case(f'"{command} {option}"', words) for option, words in named.items() if option in every]
         options.append(_case(f'"{command} -"*', every))
         options.append(_case(f'"{command} "*', _FIRST.get(command, ())))
-    text = _SCRIPT.format(commands=" ".join(sorted(_commands())), values="\n".join(values), options="\n".join(options))
+    text = _SCRIPT.format(commands=" ".join(sorted(COMMANDS)), values="\n".join(values), options="\n".join(options))
     return f"{_ZSH}\n{text}" if shell == "zsh" else text
 
 
@@ -80,13 +80,6 @@ _FIRST = {
     "completion": get_args(Shell),
 }
 """Names that commands accept as their first argument, beside files."""
-
-
-def _commands() -> Iterator[str]:
-    """The names of all commands: of the files here that can run."""
-    for path in Path(__file__).parent.glob("*.py"):
-        if "\ndef run(" in path.read_text(encoding="utf-8"):
-            yield path.stem.replace("_", "-")
 
 
 def _options(command: str) -> dict[str, tuple[str, ...]]:

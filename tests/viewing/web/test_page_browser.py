@@ -20,6 +20,7 @@ from e2efly.simulation.physics import INTEGRATORS
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
 from e2efly.validation.evaluation import SEED, Candidate, act_of, candidate
+from e2efly.vehicles.loading import vehicle_file
 from e2efly.vehicles.vehicle import terms
 from e2efly.viewing.watch.simulation import Hands, under
 from e2efly.viewing.web.exported import STARTS, beginnings, course, still
@@ -142,7 +143,7 @@ def disturbed_flight(env: Env, found: Candidate, hands: Hands, steps: int) -> np
 @pytest.fixture(scope="module")
 def odd_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The VIS-R with every term that a file may leave out."""
-    text = (FOLDER.parent / "vehicles" / "vis_r.toml").read_text()
+    text = vehicle_file("vis_r").read_text()
     units = {f.name: f.metadata["unit"] for f in terms()}
     for name, value in VALUES.items():
         text += f'\n[{name}]\nvalue = {value}\nunit = "{units[name]}"\nsource = "a test"\n'
