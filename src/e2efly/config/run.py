@@ -239,6 +239,11 @@ class TaskConfig:
         return {}
 
     @property
+    def settling_s(self) -> float:
+        """Time from which on the mean error counts, s: the option `settle_s`, if the task has it."""
+        return float(getattr(self, "settle_s", 0.0))
+
+    @property
     def own_worlds(self) -> bool:
         """Whether each episode has its own world, for plots."""
         return False

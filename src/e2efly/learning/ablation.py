@@ -137,7 +137,7 @@ def ablate(
         state = chunk(setup.env, weights, state, point * config.chunk)
         for name, env in setup.judges.items():
             flown = evaluate(env, state.parameters.policy)
-            measured = (flown.success, flown.mean_error if setup.settle else flown.final_error)
+            measured = (flown.success, flown.mean_error if setup.config.task.settling_s else flown.final_error)
             found[name].append(tuple(np.asarray(jnp.mean(x, axis=1), np.float32)[:members] for x in measured))
         if kept and time.monotonic() - saved >= kept.period:
             both = {name: tuple(np.stack(x, axis=-1) for x in zip(*rows, strict=True)) for name, rows in found.items()}
@@ -179,7 +179,12 @@ def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]
         def one(policy: Weights) -> Episodes:
             act = acting(setup.actor, policy)
             return run_episodes(
-                env, act, random_key(0, WATCHED, 0), config.eval_episodes, setup.episode_steps, setup.settle
+                env,
+                act,
+                random_key(0, WATCHED, 0),
+                config.eval_episodes,
+                setup.episode_steps,
+                setup.config.task.settling_s,
             )
 
         return _each(one, policy)

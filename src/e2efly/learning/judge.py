@@ -53,7 +53,9 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
     @partial(jax.jit, compiler_options=options | wide_vectors(episodes))
     def program(env: Env, weights: Weights, key: Any, draw: Draw) -> Episodes:
         act, steps = acting(setup.actor, weights), setup.episode_steps
-        return run_episodes(draw.env(env), act, key, episodes, steps, setup.settle, altered=partial(draw.state, env))
+        return run_episodes(
+            draw.env(env), act, key, episodes, steps, setup.config.task.settling_s, altered=partial(draw.state, env)
+        )
 
     for name, env in setup.judges.items():
         draw = Draw.of(ROWS[ALL], env.physics.nominal, rng, episodes)

@@ -128,7 +128,9 @@ def _evaluate(setup: Setup) -> Callable[[Env, Weights, jax.Array], Episodes]:
     def evaluate(env: Env, weights: Weights, key: jax.Array) -> Episodes:
         act = acting(actor, weights)
         part = jax.lax.axis_index(AXIS), setup.devices
-        flown = run_episodes(env, act, key, config.eval_episodes, setup.episode_steps, setup.settle, part)
+        flown = run_episodes(
+            env, act, key, config.eval_episodes, setup.episode_steps, setup.config.task.settling_s, part
+        )
         return jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), flown)
 
     return evaluate

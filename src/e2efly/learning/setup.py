@@ -93,8 +93,3 @@ class Setup:
     def episode_steps(self) -> int:
         """Control steps of the longest episode in which the policy is judged."""
         return max(env.episode_steps for env in self.judges.values())
-
-    @property
-    def settle(self) -> float:
-        """Time from which on the mean error counts, s."""
-        return float(getattr(self.config.task, "settle_s", 0.0))

@@ -399,7 +399,7 @@ def fly_criteria(
     check_memory({asked: float(episodes) * len(suites) * (FIGURES + kept)})
     check_time({asked: sum(env.episode_steps for env in envs.values()) * float(episodes) / FASTEST})
     for name, suite in suites.items():
-        steps, settle = envs[name].episode_steps, settling(suite)
+        steps, settle = envs[name].episode_steps, suite.settling_s
         keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
         parts = []
         for key in keys:
@@ -408,11 +408,6 @@ def fly_criteria(
             parts.append((went, *jax.tree.map(np.asarray, told)))
         flown[name], starts[name], drawn[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown, starts, drawn
-
-
-def settling(suite: TaskConfig) -> float:
-    """Time of a criterion after which the mean error counts, s."""
-    return float(getattr(suite, "settle_s", 0.0))
 
 
 def act_of(policy: Policy | Baseline) -> Act:

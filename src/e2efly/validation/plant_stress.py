@@ -13,7 +13,7 @@ from e2efly.config.budget import check_memory
 from e2efly.environment import UNSEEN, disturbance, random_key
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for
 from e2efly.simulation.device import compute_at_once, prepare
-from e2efly.validation.evaluation import SEED, settling
+from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_validation import SAMPLE, flyable, plant_name
@@ -97,7 +97,7 @@ def stress(
         total = len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023
         for i, row in enumerate(chosen):
-            report[row][name] = judge(env, starts, flights[i * episodes : (i + 1) * episodes], settling(suite))
+            report[row][name] = judge(env, starts, flights[i * episodes : (i + 1) * episodes], suite.settling_s)
     return Report(found, seed, report, plant=kind.name, left_out={} if rows else left_out)
 
 

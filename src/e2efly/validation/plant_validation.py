@@ -18,7 +18,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.runtime import check
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import fields_of
-from e2efly.validation.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria, settling
+from e2efly.validation.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.log import SAMPLE, record_of
 from e2efly.validation.plant import Plant
@@ -206,7 +206,7 @@ def validate(
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
         if log is not None:
             _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)
-        verdicts = judge(env, starts, flights, settling(suite))
+        verdicts = judge(env, starts, flights, suite.settling_s)
         criteria[criterion] = Comparison(trained[criterion], verdicts, starts, flights)
     return Validation(found, kind, seed, max_drop, criteria, differences)
 

@@ -13,7 +13,7 @@ from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import Episodes, run_stepwise, summary
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import prepare
-from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate, settling
+from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate
 from e2efly.vehicles.vehicle import Controller, Vehicle
 
 
@@ -98,7 +98,7 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
     batches = range(-(-episodes // BATCH))
     for name, suite in found.task.criteria().items():
         env = with_longer_queue(found.environment(suite))
-        steps, settle = env.episode_steps, settling(suite)
+        steps, settle = env.episode_steps, suite.settling_s
         for row in rows:
             parts = []
             for i in batches:
