@@ -12,8 +12,6 @@ from typing import Any
 
 import pytest
 
-from e2efly.environment import Env
-from e2efly.runs import presets
 from tests.conftest import QUICK
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
