@@ -70,6 +70,11 @@ class RaceClutterConfig(TaskConfig):
         authors=(
             Given("task.scale", 1.0, f"{CRL_RACING}: envs/demo2_3Dcircle_onboard.py, a circle of 6x6 m"),
             Given("task.speed", (2.0, 4.0), "ours: what tracks of this size allow; v_d of their code is 0.5 to 1 m/s"),
+            Given(
+                "task.clutter",
+                ClutterConfig(sideways=2.0, size=(0.15, 0.15)),
+                f"{CRL_RACING}: examples/ete_racing_sim/random_obstacle.py, 18 trees of 0.15 m",
+            ),
             Given("task.position", 0.3, f"{CRL_RACING}: envs/demo3_U.py, half of the starts"),
             Given("task.episode_s", 20.0, "ours: a whole lap must fit into an episode"),
             Given("env.cameras", (AUTHORS_CAMERA,), f"{CRL_RACING}: envs/demo3_U.py, sensor_kwargs and noisy_depth"),
