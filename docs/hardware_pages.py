@@ -36,7 +36,7 @@ CAMERAS = {
         ("camera ahead: RealSense D435i", "race_clutter", "avoid and race_clutter see"),
         ("camera down: ELP-USB500W05G-L180", "land_visual", "land_visual sees"),
     ),
-    "vis_h": (("camera ahead: RunCam Phoenix 2 Nano", "race_clutter", "avoid and race_clutter, by virtual images,"),),
+    "vis_h": (("camera ahead: RunCam Phoenix 2 Nano", "race_clutter", "virtual images see"),),
 }
 """For each camera of a drawing: its part, the policy whose contract has its mount, and words for the legend."""
 
