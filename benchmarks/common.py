@@ -65,9 +65,10 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
 @cache
 def training(command: str) -> dict[str, str]:
     """What stands beside a figure of `e2efly COMMAND`: the command, its preset, its integrator, and the fingerprint of
-    its configuration as it is today.
+    its configuration as it is today. The configuration is the one for a CPU, unless the command names a device.
     """
-    asked = parse(shlex.split(command)[1:])
+    words = shlex.split(command)[1:]
+    asked = parse(words if "--device" in words else [*words, "--device", "cpu"])
     about = {"preset": asked.preset, "integrator": asked.config.env.integrator}
     return {"command": command, **about, "configuration": fingerprint(asked.config)}
 
