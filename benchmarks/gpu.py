@@ -198,7 +198,7 @@ def shown(value: float, unit: str) -> str:
     if math.isnan(value):
         return "not reached"
     size, letter = next(((s, x) for s, x in ((1e9, "G"), (1e6, "M"), (1e3, "k")) if value >= s), (1.0, ""))
-    return f"{value:.1f} s" if unit == "s" else f"{value / size:.3g} {letter}".strip()
+    return f"{value:.1f} s" if unit == "s" else f"{value / size:.3g} {letter}{unit}"
 
 
 if __name__ == "__main__":

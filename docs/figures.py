@@ -112,7 +112,9 @@ Each table names its policies: the presets by which they were trained, or the zo
 is the fingerprint of everything that defines the training, and the command that it belongs to stands in the file. What
 is marked as earlier was measured with another configuration than that of today. The rates and times below that are
 older than 2026-11-24 were measured with the first-order integrator, which was the default until then. Today's default
-takes three times as long per physics sub-step ([physics](physics.md))."""
+takes three times as long per physics sub-step ([physics](physics.md)).
+
+All of these are figures of a CPU. Those of a GPU: [On a GPU](gpu.md)."""
 """What stands over all tables."""
 NOTES = {
     "c_export": """
@@ -365,7 +367,8 @@ def any_track() -> None:
 @cache
 def today(command: str) -> str:
     """The fingerprint that the configuration of a command has today."""
-    return fingerprint(parse(shlex.split(command)[1:]).config)
+    words = shlex.split(command)[1:]
+    return fingerprint(parse(words if "--device" in words else [*words, "--device", "cpu"]).config)
 
 
 def results(name: str) -> dict[str, Any]:
