@@ -1,7 +1,6 @@
 """Make the pictures of the README and the tables of docs/benchmarks.md from benchmarks/results: `make docs`."""
 
 import json
-import shlex
 import shutil
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.terminal import markdown
-from e2efly.commands.train import parse
+from e2efly.commands.train import recorded
 from e2efly.config import EnvConfig
 from e2efly.runs.inputs import fingerprint
 
@@ -367,8 +366,7 @@ def any_track() -> None:
 @cache
 def today(command: str) -> str:
     """The fingerprint that the configuration of a command has today."""
-    words = shlex.split(command)[1:]
-    return fingerprint(parse(words if "--device" in words else [*words, "--device", "cpu"]).config)
+    return fingerprint(recorded(command).config)
 
 
 def results(name: str) -> dict[str, Any]:

@@ -112,6 +112,12 @@ def parse(arguments: list[str]) -> Train:
     )  # fmt: skip
 
 
+def recorded(command: str) -> Train:
+    """What a command that stands beside a figure is asked to do: on a CPU, unless it names a device itself."""
+    words = shlex.split(command)[1:]
+    return parse(words if "--device" in words else [*words, "--device", "cpu"])
+
+
 def _again(o: Train) -> str:
     """How to continue a run that was stopped."""
     command = ["e2efly", "train", "--resume", str(o.out)]
