@@ -125,7 +125,7 @@ def main() -> None:
     (card,) = topologies.get_topology_desc("h200", "cuda", target_config=H200, topology="1x1x1").devices
     rows = [row(task, algo, card) for task in options.tasks for algo in options.algos]
     print(table(rows))
-    write("gpu_programs", options.json, {"table": rows, "card": "NVIDIA H200, by its data"})
+    write("gpu_programs", options.json, {"table": rows, "card": "NVIDIA H200"})
 
 
 if __name__ == "__main__":

@@ -34,8 +34,5 @@ def test_a_part_that_takes_too_long_or_fails_is_named(monkeypatch: pytest.Monkey
     assert gpu.measured("hover", True, "cpu", 0.2) == ([], "its 0 s were over")
     rows, why = gpu.measured("no_such_part", True, "cpu", 60)
     assert (rows, why) == ([], "KeyError: 'no_such_part'")
-    assert [gpu.shown(*x) for x in ((13.1e9, "/s"), (8.04, "s"), (float("nan"), "s"))] == [
-        "13.1 G",
-        "8.0 s",
-        "not reached",
-    ]
+    figures = (13.1e9, "/s"), (8.04, "s"), (float("nan"), "s")
+    assert [gpu.shown(*figure) for figure in figures] == ["13.1 G/s", "8.0 s", "not reached"]

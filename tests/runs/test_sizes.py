@@ -41,10 +41,11 @@ def test_a_preset_on_a_gpu_has_more_environments_and_as_many_gradient_steps(task
     per_update = [config.algo.steps / getattr(config.algo, "minibatch", config.algo.steps) for config in (cpu, gpu)]
     assert per_update[0] == per_update[1]
     updates = [config.steps // config.algo.steps for config in (cpu, gpu)]
-    assert abs(updates[0] // 4 - updates[1]) <= 1
+    wanted = updates[0] / 4 if updates[0] > 1200 else min(updates[0] / 2, 300)
+    assert abs(updates[1] - wanted) <= 1
     assert updates[1] // gpu.chunk >= 10
-    stages = [[stage.steps / config.algo.steps for stage in config.curriculum] for config in (cpu, gpu)]
-    assert stages[1] == [updates / 4 for updates in stages[0]]
+    stages = [[stage.steps / config.steps for stage in config.curriculum] for config in (cpu, gpu)]
+    assert stages[1] == pytest.approx(stages[0], rel=1e-3)
     same: tuple[Any, ...] = cpu.task, cpu.reward, cpu.env, cpu.network, cpu.algo.learning_rate
     assert same == (gpu.task, gpu.reward, gpu.env, gpu.network, gpu.algo.learning_rate)
 
