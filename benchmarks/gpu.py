@@ -2,8 +2,9 @@
 
     python benchmarks/gpu.py [--parts physics images ...] [--device cpu] [--short] [--json FILE]
 
-At most eight minutes. Each part is a process of its own, which ends when its seconds are over; what it did not measure
-until then, or cannot measure here, is named. Without a GPU, nothing is measured or written, and the exit status is 1.
+At most eight minutes, with e2efly[mesh-cuda]. Each part is a process of its own, which ends when its seconds are
+over; what it did not measure until then, or cannot measure here, is named. Without a GPU, nothing is measured or
+written, and the exit status is 1.
 `--device cpu --short` runs every part in small, to see that it works: its figures are printed, never published.
 """
 
