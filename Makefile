@@ -53,10 +53,10 @@ zoo: $(READY)
 docs: $(DOCS_READY)
 	$(BIN)/python docs/figures.py
 	$(BIN)/python docs/paper_page.py
-	$(BIN)/python docs/gpu_page.py
 	$(BIN)/python docs/zoo_cards.py
 	$(BIN)/python docs/command_line.py
 	$(BIN)/python docs/notebook_pages.py
+	$(BIN)/python docs/gpu_page.py
 	@$(MAKE) --no-print-directory site
 
 # The variable leaves out a notice of the end of MkDocs Material (docs/decisions.md).

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from e2efly.commands.train import recorded
+from e2efly.commands.train import parse
 from e2efly.config import StageConfig
 from e2efly.policy.zoo import FOLDER, USUAL, contents, curve_file, policy_file
 from e2efly.runs.rundir import RunDirectory
@@ -125,7 +125,7 @@ def test_the_command_of_a_card_gives_the_configuration_of_its_policy() -> None:
     assert [name for name, _ in commands] == re.findall(r"### (\S+)\n", page)
     for name, command in commands:
         vehicle, task = name.split("/")
-        config = recorded(command).config
+        config = parse(command.split()[1:]).config
         assert config == cards.configured(policy_file(name)), name
         chunk = config.algo.steps * config.chunk
         assert -(-config.steps // chunk) * chunk == contents()[vehicle][task]["env_steps"], name
@@ -133,7 +133,7 @@ def test_the_command_of_a_card_gives_the_configuration_of_its_policy() -> None:
 
 def test_a_card_says_where_todays_command_makes_another_policy() -> None:
     made_by, command = script("zoo_cards").made_by, "train hover --seed 0"
-    config = recorded(command).config
+    config = parse(command.split()[1:]).config
     assert made_by(command, config) == f"`e2efly {command}`"
     longer = dataclasses.replace(config, steps=3_133_440)
     assert made_by(command, longer) == f"`e2efly {command} --steps 3133440` (today's preset has steps {config.steps})"
