@@ -5,7 +5,6 @@ import json
 import math
 import os
 import platform
-import shlex
 import statistics
 import sys
 from collections.abc import Callable
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.terminal import markdown
-from e2efly.commands.train import parse
+from e2efly.commands.train import recorded
 from e2efly.config import EnvConfig
 from e2efly.config.storage import write_json
 from e2efly.runs.inputs import fingerprint
@@ -65,9 +64,9 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
 @cache
 def training(command: str) -> dict[str, str]:
     """What stands beside a figure of `e2efly COMMAND`: the command, its preset, its integrator, and the fingerprint of
-    its configuration as it is today.
+    its configuration as it is today. The configuration is the one for a CPU, unless the command names a device.
     """
-    asked = parse(shlex.split(command)[1:])
+    asked = recorded(command)
     about = {"preset": asked.preset, "integrator": asked.config.env.integrator}
     return {"command": command, **about, "configuration": fingerprint(asked.config)}
 

@@ -24,9 +24,6 @@ prepare()
 import jax  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
-import trimesh  # noqa: E402
-from embreex.mesh_construction import TriangleMesh  # noqa: E402
-from embreex.rtcore_scene import EmbreeScene  # noqa: E402
 from rendering import rays_of  # noqa: E402
 
 from e2efly.config import CameraConfig  # noqa: E402
@@ -64,6 +61,9 @@ def ours(scene: MeshScene, size: int, channels: tuple[str, ...], pose: Any) -> C
 
 def bare(scene: MeshScene, size: int, pose: Any, pool: ThreadPoolExecutor) -> Callable[[], Any]:
     """The same rays, ready, by Embree's binding."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
     rays = EmbreeScene()
     mesh = TriangleMesh(rays, scene.triangles)
     origins, directions = rays_of(*pose, config(size))
@@ -100,6 +100,8 @@ def grid_row(name: str, scene: MeshScene) -> dict[str, str]:
 
 def grid_error() -> tuple[float, float]:
     """Mean and largest error for a ball, m."""
+    import trimesh
+
     ball = trimesh.creation.icosphere(5, 1.0)
     grid = DistanceGrid.of(MeshScene.of([MeshPart("ball", np.asarray(ball.vertices), np.asarray(ball.faces))]), CELL)
     points = np.random.default_rng(0).uniform(-1.8, 1.8, (20_000, 3)).astype(np.float32)

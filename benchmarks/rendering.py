@@ -26,8 +26,6 @@ prepare()
 import jax  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
-from embreex.mesh_construction import TriangleMesh  # noqa: E402
-from embreex.rtcore_scene import EmbreeScene  # noqa: E402
 
 from e2efly.config import CameraConfig  # noqa: E402
 from e2efly.learning.devices import OWN, on_each, placed  # noqa: E402
@@ -102,6 +100,9 @@ class Embree:
     """Embree scenes of a batch of worlds."""
 
     def __init__(self, scene: Scene, segments: int) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
         self.scenes, self.meshes, self.build_s = [], [], []
         self.triangles = 0
         for world in range(scene.worlds):

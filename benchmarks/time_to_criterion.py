@@ -44,12 +44,12 @@ def command(goal: str, algo: str) -> str:
     return f"train {name} --algo {algo} --preset {preset} --stop-at {success}"
 
 
-def run(goal: str, algo: str, seed: int, cache: Path) -> dict[str, float]:
+def run(command: str, seed: int, cache: Path, device: str = "cpu") -> dict[str, float]:
     """One process; seconds and environment steps at the criterion (NaN when it was not reached), and peak memory."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
-        options = ["--seed", str(seed), "--out", str(out), "--no-plots", "--device", "cpu"]
-        whole = [sys.executable, "-m", "e2efly", *command(goal, algo).split(), *options]
+        options = ["--seed", str(seed), "--out", str(out), "--no-plots", "--device", device]
+        whole = [sys.executable, "-m", "e2efly", *command.split(), *options]
         process = subprocess.Popen(
             whole, env={**os.environ, "XDG_CACHE_HOME": str(cache)}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )
@@ -64,7 +64,7 @@ def run(goal: str, algo: str, seed: int, cache: Path) -> dict[str, float]:
 def both(goal: str, algo: str, seed: int) -> dict[str, dict[str, float]]:
     """The run with an empty cache, and the same again."""
     with tempfile.TemporaryDirectory() as cache:
-        return {when: run(goal, algo, seed, Path(cache)) for when in ("cold", "warm")}
+        return {when: run(command(goal, algo), seed, Path(cache)) for when in ("cold", "warm")}
 
 
 def number(x: float | None) -> float:

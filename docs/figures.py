@@ -1,7 +1,6 @@
 """Make the pictures of the README and the tables of docs/benchmarks.md from benchmarks/results: `make docs`."""
 
 import json
-import shlex
 import shutil
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.terminal import markdown
-from e2efly.commands.train import parse
+from e2efly.commands.train import recorded
 from e2efly.config import EnvConfig
 from e2efly.runs.inputs import fingerprint
 
@@ -112,7 +111,9 @@ Each table names its policies: the presets by which they were trained, or the zo
 is the fingerprint of everything that defines the training, and the command that it belongs to stands in the file. What
 is marked as earlier was measured with another configuration than that of today. The rates and times below that are
 older than 2026-11-24 were measured with the first-order integrator, which was the default until then. Today's default
-takes three times as long per physics sub-step ([physics](physics.md))."""
+takes three times as long per physics sub-step ([physics](physics.md)).
+
+All of these are figures of a CPU. Those of a GPU: [On a GPU](gpu.md)."""
 """What stands over all tables."""
 NOTES = {
     "c_export": """
@@ -365,7 +366,7 @@ def any_track() -> None:
 @cache
 def today(command: str) -> str:
     """The fingerprint that the configuration of a command has today."""
-    return fingerprint(parse(shlex.split(command)[1:]).config)
+    return fingerprint(recorded(command).config)
 
 
 def results(name: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from e2efly.commands.train import parse
+from e2efly.commands.train import recorded
 from e2efly.config import TrainConfig
 from e2efly.config.changes import differing
 from e2efly.config.env import FILE, STILL
@@ -102,12 +102,12 @@ def made_by(command: str, config: TrainConfig) -> str:
     """How a configuration is trained today: the command, with the options in which the preset differs by now. Where
     options cannot say it, how the two differ.
     """
-    others = differing(config, parse(command.split()[1:]).config)
+    others = differing(config, recorded(command).config)
     now = ", ".join(f"{name} {today}" for name, (_, today) in others.items())
     options = "".join(f" --{name.replace('_', '-')} {value}" for name, (value, _) in others.items())
     try:
         with redirect_stderr(StringIO()):
-            same = parse((command + options).split()[1:]).config == config
+            same = recorded(command + options).config == config
     except (ValueError, SystemExit):  # not everything is an option
         same = False
     if same:

@@ -21,7 +21,7 @@ def list_tasks() -> list[str]:
     return list(TASKS)
 
 
-def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None) -> TrainConfig:
+def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None, device: str = "cpu") -> TrainConfig:
     """The configuration for learning a task.
 
     Args:
@@ -30,22 +30,25 @@ def preset(task: TaskLike, algo: AlgoLike | None = None, name: str | None = None
             the task best.
         name: robust, nominal, paper, or a variant of the task. If omitted, robust if the task has it for the
             algorithm, otherwise nominal.
+        device: the device for which it is sized: cpu or gpu.
 
     Raises:
         ValueError: for an unknown name. The message gives the nearest name and all known names.
     """
-    return _starting(task, algo, name)
+    return _starting(task, algo, name, None, None, device)
 
 
-def _starting(task: TaskLike, algo: AlgoLike | None, name: str | None, *given: str | None) -> TrainConfig:
-    """`presets.starting` for names, classes or an instance of task options. `given`: the vehicle and `start_from`."""
+def _starting(
+    task: TaskLike, algo: AlgoLike | None, name: str | None, vehicle: str | None, start_from: str | None, device: str
+) -> TrainConfig:
+    """`presets.starting` for names, classes or an instance of task options."""
     options = task if isinstance(task, TaskConfig) else None
     if not isinstance(task, str):
         task = TASKS.reference(type(task) if isinstance(task, TaskConfig) else task)
     if isinstance(algo, type):
         algo = ALGORITHMS.reference(algo)
     algo, name = presets.completed(task, algo, name, lambda option: getattr(options, option, None))
-    config = presets.starting(task, algo, name, *given)
+    config = presets.starting(task, algo, name, vehicle, start_from, device)
     return config if options is None else dataclasses.replace(config, task=options)
 
 
@@ -84,7 +87,7 @@ def train(
         resume: continue the run in `out`.
         overwrite: delete the run in `out` and start again.
         progress: print what the command line prints.
-        device: cpu or gpu.
+        device: cpu or gpu. The preset's sizes are those for the device. If omitted, the device that JAX finds.
         changes: other fields of `TrainConfig`, such as steps or seed.
 
     Returns:
@@ -94,14 +97,17 @@ def train(
         ValueError: naming the field, the value and what is accepted.
         FloatingPointError: when a loss is not finite. The previous checkpoint is kept.
     """
-    config = _starting(task, algo, preset_name, vehicle, None if start_from is None else os.fspath(start_from))
+    prepare(device)
+    import jax
+
+    first = None if start_from is None else os.fspath(start_from)
+    config = _starting(task, algo, preset_name, vehicle, first, jax.default_backend())
     env = env if env is None or vehicle is None else dataclasses.replace(env, vehicle=vehicle)
     given = {"env": env, "network": network, "algo": options} | changes
     if reward is not None:
         given["reward"] = reward if isinstance(reward, RewardConfig) else RewardConfig(reward, config.reward.parameters)
     given = {name: value for name, value in given.items() if value is not None}
     config = presets.begun(dataclasses.replace(config, **given))
-    prepare(device)
     from e2efly.commands.terminal import Terminal, TerminalProgress
     from e2efly.learning.runner import train as run
     from e2efly.learning.setup import Setup

@@ -12,8 +12,8 @@ import pytest
 from e2efly.config import NetworkConfig, TrainConfig
 from e2efly.environment import Env, random_key
 from e2efly.environment.episodes import Act, run_episodes
-from e2efly.learning.devices import share
-from e2efly.learning.programs import Programs, evaluation_program
+from e2efly.learning.devices import OWN, SAME, on_each, share
+from e2efly.learning.programs import Programs, _chunk, evaluation_program, start_program
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
@@ -118,3 +118,20 @@ def test_how_many_devices_share(envs: int, minibatch: int | None, asked: int | N
 def test_devices_that_cannot_share(envs: int, asked: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         share(envs, None, asked)
+
+
+def test_on_a_gpu_too_the_steps_of_a_chunk_are_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program whose windows, updates or sub-steps were unrolled would take a GPU minutes to compile."""
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    found = []
+    for horizon, chunk in ((4, 2), (32, 20)):
+        base = dataclasses.replace(config(), chunk=chunk, devices=1)
+        setup = Setup.of(dataclasses.replace(base, algo=dataclasses.replace(base.algo, horizon=horizon)))
+        parameters = setup.parameters()
+        state = jax.eval_shape(start_program(setup), setup.env, parameters, random_key(0))
+        program = on_each(_chunk(setup), 1, (SAME, SAME, OWN, SAME, SAME), (OWN, SAME))
+        traced = program.trace(setup.env, setup.config.algo, state, 0, 40)
+        text = traced.lower(lowering_platforms=("cuda",)).as_text()
+        found.append((text.count(" stablehlo."), text.count("stablehlo.while")))
+    assert found[0] == found[1]
+    assert found[0][1] >= 5

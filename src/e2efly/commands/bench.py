@@ -40,11 +40,13 @@ def run(options: Bench) -> int:
 
 def measure() -> dict[str, float]:
     """Steps per second, by kind of step: the best of several runs after compilation."""
+    import jax
+
     from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
 
     return {
         "physics sub-steps, 1024 vehicles": physics_substeps(1024),
         "environment steps, 1024 environments, hover": environment_steps("hover", 1024),
-        "PPO training steps, hover preset": training_steps("hover", "ppo"),
-        "BPTT training steps, hover preset": training_steps("hover", "bptt"),
+        "PPO training steps, hover preset": training_steps("hover", "ppo", device=jax.default_backend()),
+        "BPTT training steps, hover preset": training_steps("hover", "bptt", device=jax.default_backend()),
     }

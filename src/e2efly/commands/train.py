@@ -20,7 +20,7 @@ from e2efly.config.run import TIMED
 from e2efly.config.storage import read_json
 from e2efly.learning.supervised import is_watched, watched
 from e2efly.runs import presets
-from e2efly.simulation.device import Hosts, prepare
+from e2efly.simulation.device import Hosts, device_kind, prepare
 from e2efly.tasks import TASKS
 
 if TYPE_CHECKING:
@@ -105,10 +105,17 @@ def parse(arguments: list[str]) -> Train:
     config = presets.changed(defaults, _given(o, defaults))
     if o.resume and o.overwrite:
         raise ValueError("--resume and --overwrite are both given; accepted: one of them")
+    sized_for_gpu = not (file or goes_on) and device_kind(o.device) == "gpu"  # then nothing else will do
     return Train(
-        config, o.preset, o.out or run_folder(config), o.resume, o.overwrite, o.device, o.plots, o.hosts, o.watch,
-        arguments,
+        config, o.preset, o.out or run_folder(config), o.resume, o.overwrite, "gpu" if sized_for_gpu else o.device,
+        o.plots, o.hosts, o.watch, arguments,
     )  # fmt: skip
+
+
+def recorded(command: str) -> Train:
+    """What a command that stands beside a figure is asked to do: on a CPU, unless it names a device itself."""
+    words = shlex.split(command)[1:]
+    return parse(words if "--device" in words else [*words, "--device", "cpu"])
 
 
 def _again(o: Train) -> str:
@@ -241,13 +248,19 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
         ("resume", _help(bool, "Continue the run in --out. `e2efly train --resume DIR` is enough.")),
         ("start_from", _help(str | None, f"Start from {_POLICY}. If omitted, from fresh weights.", name="from")),
         ("overwrite", _help(bool, "Delete the run in --out, and start again.")),
-        ("device", _help(Literal["cpu", "gpu"] | None, "Where to compute.")),
+        (
+            "device",
+            _help(
+                Literal["cpu", "gpu"] | None,
+                "Where to compute. The preset's sizes are those for this device. If omitted, on a GPU if there is one.",
+            ),
+        ),
         ("plots", _help(bool, "Evaluate and draw plots at the end.")),
         ("steps", _help(int, "Environment steps of the whole run.")),
         ("chunk", _help(int, "Updates between two evaluations (sets shapes).")),
         ("eval_episodes", _help(int, "Starts per evaluation during training (sets shapes).")),
         ("devices", _help(int | None, "Devices (on a CPU: cores) that share the environments.")),
-        ("fast_compile", _help(bool, "On a CPU: compile faster but run slower. Good for runs of a few seconds.")),
+        ("fast_compile", _help(bool, "Compile faster but run slower. Good for runs of a few seconds.")),
         ("curriculum", _help(bool, "Go through the stages of the preset's curriculum, if it has one.")),
         ("stop_at", _help(float | None, "Stop when the success rate on 1000 starts is at least this.")),
         (
@@ -299,7 +312,8 @@ def _of_preset(arguments: list[str]) -> tuple[TrainConfig, str]:
     algo, preset = presets.completed(
         task, peek(arguments, "--algo"), peek(arguments, "--preset"), lambda name: peek(arguments, f"--task.{name}")
     )
-    config = presets.starting(task, algo, preset, _vehicle(arguments), peek(arguments, "--from"))
+    device = device_kind(peek(arguments, "--device"))
+    config = presets.starting(task, algo, preset, _vehicle(arguments), peek(arguments, "--from"), device)
     if arguments[:1] != [task] and not asks_help(arguments):
         raise ValueError(f"train needs a task first: {_join(TASKS)}")
     return config, preset

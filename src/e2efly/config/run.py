@@ -331,8 +331,8 @@ class TrainConfig:
     """Devices (on a CPU: cores) that share the environments. If omitted, all devices, with at least 32 environments on
     each."""
     fast_compile: bool = True
-    """On a CPU: compile faster but run slower. Good for runs of a few seconds. With cameras, it runs at half the rate
-    or less."""
+    """Compile faster but run slower. Good for runs of a few seconds. With cameras, a CPU then runs at half the rate or
+    less. On a GPU it leaves out the search for the fastest kernel of each matrix product."""
     curriculum: tuple[StageConfig, ...] = ()
     """Stages before the task itself."""
     stop_at: float | None = number(None, above=0, high=1.0)

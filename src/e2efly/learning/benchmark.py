@@ -80,13 +80,13 @@ GENERAL = dict.fromkeys(_OWN, 0.1)
 """Relative ranges of the parameters that are drawn anew in every episode, so that every vehicle is different."""
 
 
-def training_steps(task: str, algo: str, wide: bool = False, general: bool = False) -> float:
-    """Environment steps per second of training with a preset.
+def training_steps(task: str, algo: str, wide: bool = False, general: bool = False, device: str = "cpu") -> float:
+    """Environment steps per second of training with the preset nominal, in its sizes for a device.
 
     With `wide`: 100 environments, horizon 96, networks with 192 and 96 units. With `general`: every vehicle has its own
     parameters.
     """
-    config = presets.preset(task, algo)
+    config = presets.starting(task, algo, presets.NOMINAL, device=device)
     if general:
         config = dataclasses.replace(config, env=dataclasses.replace(config.env, randomize=GENERAL))
     if wide and config.algo.exact:

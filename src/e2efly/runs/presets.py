@@ -24,6 +24,7 @@ from e2efly.policy import zoo
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.runs.paper import authors, papers
+from e2efly.runs.sizes import for_device
 from e2efly.tasks import TASKS
 from e2efly.vehicles import posterior
 from e2efly.vehicles.family import load_family
@@ -87,12 +88,15 @@ def completed(
     return algo, name or next(asked, usual)
 
 
-def starting(task: str, algo: str, name: str, vehicle: str | None = None, start_from: str | None = None) -> TrainConfig:
-    """The configuration from which the options of a training depart: a preset (`preset`), for a vehicle (`for_vehicle`)
-    and for a policy whose weights it starts from (`gentle`).
+def starting(
+    task: str, algo: str, name: str, vehicle: str | None = None, start_from: str | None = None, device: str = "cpu"
+) -> TrainConfig:
+    """The configuration from which the options of a training depart: a preset (`preset`), for a vehicle
+    (`for_vehicle`), for a device (`for_device`) and for a policy whose weights it starts from (`gentle`).
     """
     config = preset(task, algo, name)
     config = config if vehicle is None else for_vehicle(config, vehicle)
+    config = for_device(config, name, device)
     return config if start_from is None else dataclasses.replace(gentle(config), start_from=start_from)
 
 
