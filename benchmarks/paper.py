@@ -1,14 +1,19 @@
 """The paper's experiments: every table and figure that needs no vehicle, ours beside theirs, with a verdict a claim.
 
     python benchmarks/paper.py EXPERIMENT... [--seeds N] [--tasks hover ...] [--algos bptt ...] [--variants TEXT ...]
-                               [--most STEPS] [--runs FOLDER] [--again] [--short] [--json FILE]
+                               [--most STEPS] [--stop SUCCESS] [--device cpu|gpu] [--runs FOLDER] [--again] [--short]
+                               [--json FILE]
     python benchmarks/paper.py                # judges anew what is there already
 
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
-with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--most` stops a training in order
-once it has taken so many steps: it counts with those, and a later command with more of them goes on. `--short`
-makes the first run or two of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
-the verdicts: `benchmarks/claims`.
+with `--again`, and a training that was killed goes on from its checkpoint in --runs.
+
+`--most` stops a training in order once it has taken so many steps. `--stop` stops it once its success has stayed at a
+level for a few evaluations: that answers whether it learns and when, but not what its rewards come to after all its
+steps. A run that was stopped counts with the steps that it has, and a later command without the option goes on.
+
+`--short` makes the first run or two of each experiment in seconds, with sizes that teach nothing. Experiments, runs and
+rules of the verdicts: `benchmarks/claims`.
 """
 
 import argparse
@@ -20,7 +25,7 @@ from typing import Any
 
 from claims import EXPERIMENTS
 from claims.experiment import Experiment, Found, Run
-from claims.running import How, key, make, wanted
+from claims.running import HELD, LEVELS, How, key, make, wanted
 from common import RESULTS, machine, table, today
 
 from e2efly.config.storage import held, write_json
@@ -76,7 +81,12 @@ def asked(experiment: Experiment, options: argparse.Namespace) -> list[tuple[Run
     ]
     runs = runs[: experiment.short] if options.short else runs
     seeds = range(1 if options.short else options.seeds or experiment.seeds)
-    return [(run, seed) for seed in seeds for run in runs if seed == 0 or run.kind == "train"]
+    return [(run, seed) for seed in seeds for run in runs if seed < most(run, len(seeds))]
+
+
+def most(run: Run, seeds: int) -> int:
+    """How many of the seeds a run has: a training each of them, if it has no limit of its own."""
+    return 1 if run.kind != "train" else seeds if run.seeds is None else min(seeds, run.seeds)
 
 
 def parsed() -> argparse.Namespace:
@@ -89,6 +99,10 @@ def parsed() -> argparse.Namespace:
     add("--algos", nargs="*", default=[], help="these alone: bptt, ppo, zoo")
     add("--variants", nargs="*", default=[], help="those alone whose names hold one of these texts")
     add("--most", type=float, default=math.inf, help="stop a training after so many environment steps")
+    add(
+        "--stop", type=float, choices=LEVELS, help=f"stop a training once its success stays so high: {HELD} evaluations"
+    )
+    add("--device", choices=["cpu", "gpu"], default="cpu", help="where to train; left out: cpu")
     add(
         "--runs",
         type=Path,
@@ -108,7 +122,13 @@ def main() -> None:
     """Make what is asked for, judge, print the tables, write JSON."""
     options = parsed()
     with tempfile.TemporaryDirectory() as folder:
-        how = How(options.runs or Path(folder), short=options.short, most=options.most)
+        how = How(
+            options.runs or Path(folder),
+            short=options.short,
+            most=options.most,
+            stop=options.stop,
+            device=options.device,
+        )
         with held(how.folder):
             for name in options.experiments:
                 measure(EXPERIMENTS[name], options, how)

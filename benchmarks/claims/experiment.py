@@ -35,6 +35,8 @@ class Run:
     """By name."""
     kind: Literal["train", "zoo", "ablate"] = "train"
     """train: each seed; zoo: the policy that comes with the package, once; ablate: all seeds in one process."""
+    seeds: int | None = None
+    """Most seeds of a training. None: as many as the experiment has."""
 
 
 @dataclass(frozen=True)

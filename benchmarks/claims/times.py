@@ -13,7 +13,7 @@ from claims.experiment import (
     mean,
     verdict,
 )
-from claims.learning import LONG, PAPER, TASKS, THEIRS, each
+from claims.learning import LONG, PAPER, SEEN, TASKS, THEIRS, each
 
 
 def faster(found: Found) -> Verdict:
@@ -60,7 +60,7 @@ SPEED = Experiment(
         Claim("Frames per second of training, 100 environments", "13 to 24 k on an RTX 4090", above),
     ),
     tuple(
-        Run(task, algo, "speed", (*PAPER, *(LONG if algo == "ppo" else ()), "--steps", "2000000"))
+        Run(task, algo, "speed", ("--preset", PAPER, *SEEN, *(LONG if algo == "ppo" else ()), "--steps", "2000000"))
         for task in TASKS
         for algo in ("bptt", "ppo")
     ),
