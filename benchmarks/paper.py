@@ -24,7 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from claims import EXPERIMENTS
-from claims.experiment import Experiment, Found, Run
+from claims.experiment import Experiment, Run
+from claims.found import Found
+from claims.rule import judge
 from claims.running import HELD, LEVELS, How, key, make, wanted
 from common import RESULTS, machine, table, today
 
@@ -49,14 +51,21 @@ def read(path: Path) -> dict[str, Any]:
 def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
     """What an experiment is, and what its runs come to: its claims with verdicts, and its table."""
     found = Found(runs, results)
-    verdicts = [(claim, claim.judge(found)) for claim in experiment.claims]
+    verdicts = [(claim, judge(claim, found)) for claim in experiment.claims]
     return {
         "title": experiment.title,
         "where": experiment.where,
         "about": experiment.about.strip(),
         "made_of": {name: known["date"] for name in experiment.made_of if (known := results(name))},
         "claims": [
-            {"the paper": c.says, "theirs": c.theirs, "ours": v.ours, "verdict": v.word, "why": v.why}
+            {
+                "the paper": c.says,
+                "theirs": c.theirs,
+                "verdict": v.word,
+                "why": v.why,
+                "cases": v.cases,
+                "invented": v.invented,
+            }
             for c, v in verdicts
         ],
         "table": experiment.rows(found),
@@ -136,7 +145,10 @@ def main() -> None:
     write(options.json, known)
     for name in options.experiments or EXPERIMENTS:
         result = judged(EXPERIMENTS[name], known[name]["runs"])
-        print(f"\n{EXPERIMENTS[name].title}\n\n{table(result['claims'])}")
+        words = [
+            {part: claim[part] for part in ("the paper", "theirs", "verdict", "why")} for claim in result["claims"]
+        ]
+        print(f"\n{EXPERIMENTS[name].title}\n\n{table(words)}")
         if result["table"]:
             print(f"\n{table(result['table'])}")
 
