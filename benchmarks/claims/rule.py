@@ -210,7 +210,7 @@ def number_row(number: Invented, found: Found) -> dict[str, str]:
     known = {one["variant"] for one in found.runs}
     measured = [name for name in number.variants if name in known]
     missing = [name for name in number.variants if name not in known]
-    told = (number.by, "; ".join(measured), f"not yet: {"; ".join(missing)}" if missing else "")
+    told = (number.by, "; ".join(measured), f"not yet: {'; '.join(missing)}" if missing else "")
     return {"number": number.what, "ours": number.ours, "varied": "; ".join(filter(None, told)) or "no"}
 
 
