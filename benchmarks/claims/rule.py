@@ -150,7 +150,7 @@ def judge(claim: Claim, found: Found) -> Verdict:
     told = [row(case) for case in claim.cases(found)]
     listed = [number_row(number, found) for number in claim.invented or ()]
     if against:
-        lacking = missing(claim, [case for of in against.values() for case in of if case.learns], found)
+        lacking = missing(claim, [max((x for x in of if x.learns), key=strength) for of in against.values()], found)
         contradicted = f"contradicted by {', '.join(against)}"
         parts = (contradicted, f"but {'; '.join(lacking)}" if lacking else "", unlearned, claim.why)
         return Verdict(DIFFERS if lacking else REFUTED, "; ".join(filter(None, parts)), told, listed)
@@ -160,8 +160,13 @@ def judge(claim: Claim, found: Found) -> Verdict:
     return Verdict(UNMEASURED, "; ".join(filter(None, (so_far, unlearned, claim.why))), told, listed)
 
 
+def strength(case: Case) -> tuple[int, bool]:
+    """What orders the cases of one name: the seeds of the side with the fewest, and whether all took their steps."""
+    return min((side.seeds for side in case.sides), default=0), all(side.whole for side in case.sides)
+
+
 def missing(claim: Claim, against: Sequence[Case], found: Found) -> list[str]:
-    """What the cases that contradict a claim lack to refute it."""
+    """What the strongest of the cases of each name that contradict a claim lack to refute it."""
     sides = [side for case in against for side in case.sides]
     fewest = min((side.seeds for side in sides), default=0)
     lacking = [claim.theirs_alone] if claim.theirs_alone else []

@@ -250,8 +250,9 @@ def test_a_claim_about_learning_is_refuted_only_if_the_rule_is_met() -> None:
         unvaried = [one for one in others if one["variant"] not in number.variants]
         assert f"not varied: {number.what}" in verdict([*fails, *unvaried, *able]).why
     # with one choice of an invented number every task is learned: then the claim holds
-    chosen = varied([f"{PAPER}, {VARIED[0][0]}"], learned("ppo", 1e6))
-    assert "hover" not in verdict([*fails, *others, *able, *chosen]).why
+    name = f"{PAPER}, {VARIED[0][0]}"
+    remaining = [one for one in others if one["variant"] != name]
+    assert verdict([*fails, *remaining, *able, *varied([name], learned("ppo", 1e6))]).word == CONFIRMED
 
 
 def case(agrees: bool, runs: list[dict[str, Any]], claimed: float | None = 1e6, learns: bool = True) -> Claim:
