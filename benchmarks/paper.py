@@ -65,6 +65,7 @@ def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
                 "why": v.why,
                 "cases": v.cases,
                 "invented": v.invented,
+                **v.measured,
             }
             for c, v in verdicts
         ],

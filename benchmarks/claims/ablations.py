@@ -105,8 +105,8 @@ NUMBERS = (
 
 ABLATION = Experiment(
     "ablation",
-    "Rewards without one of their parts",
-    "figures *Success rate and task error under different reward settings training via PPO*, and *via BPTT*",
+    "Success rate and task error under different reward settings",
+    "figures *training via PPO* and *training via BPTT*",
     (
         Claim("Hovering, landing and tracking get worse without progress, action, velocity or body rate",
               "by both algorithms", without(NEEDED, STABLE, ("ppo", "bptt")), 21, NUMBERS),

@@ -34,8 +34,8 @@ def table_of(name: str) -> Any:
 
 STEPS = Experiment(
     "step_response",
-    "Step response",
-    "figure *The step-response alignment*",
+    "The step-response alignment",
+    "figure of this caption",
     (
         Claim(
             "After alignment, the simulator's step response matches the vehicle's",
@@ -50,9 +50,7 @@ STEPS = Experiment(
     made_of=("step_response",),
     about="""
 The real firmware takes the place of the vehicle, on a simulated body ([how](identification.md#align)). The table has
-the time until 10 % and 63 % of the step, and the overshoot.
-
-![Steps through real Betaflight firmware, and the simulator](step_response.png)""",
+the time until 10 % and 63 % of the step, and the overshoot.""",
 )
 
 DROP = 2.0
@@ -164,9 +162,9 @@ NEEDS = "needs the vehicle"
 FLIGHTS = "benchmarks.md#whole-flights-through-real-betaflight-firmware-nobody-helping"
 REAL = Experiment(
     "real",
-    "What needs a vehicle",
-    "figures *Policy response after step-response alignment* and *Zero-shot transfer from simulation to real world*; "
-    "table *vehicle parameters*",
+    "Policy response, and what else needs a vehicle",
+    "figures *Policy response after step-response alignment*, *Zero-shot transfer from simulation to real world*; "
+    "table of vehicle parameters",
     (
         Claim("Zero-shot transfer of all tasks to VIS-R", "shown by flights, without a success rate",
               untestable=f"{NEEDS}; [flights through the real firmware]({FLIGHTS}) take their place"),

@@ -201,8 +201,8 @@ NUMBERS = (
 
 LEARNING = Experiment(
     "learning",
-    "PPO against BPTT",
-    "figure *Training rewards comparison between PPO and BPTT*",
+    "Training rewards comparison between PPO and BPTT",
+    "figure of this caption",
     (
         Claim("BPTT converges in fewer steps", "1e7 to 5e7 against 5e7 to 1e8", fewer, len(TASKS), NUMBERS, TO_LEVEL),
         Claim("BPTT needs under 30 % of PPO's time", "on average 1200 s against 4150 s, 29 %", sooner, 1, NUMBERS,

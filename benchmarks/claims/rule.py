@@ -123,6 +123,8 @@ class Verdict:
     """A row per case: its figure, seeds, steps."""
     invented: list[dict[str, str]] = field(default_factory=list)
     """A row per invented number: its value, and how it was varied so far."""
+    measured: dict[str, str] = field(default_factory=dict)
+    """Seeds, and environment steps in millions, ours and theirs, of the strongest case of each name."""
 
 
 def taken(one: Mapping[str, Any]) -> float | None:
@@ -147,17 +149,33 @@ def judge(claim: Claim, found: Found) -> Verdict:
     against = {name: of for name, of in groups.items() if name not in agreeing and any(case.learns for case in of)}
     silent = [name for name in groups if name not in agreeing and name not in against]
     unlearned = f"the comparison does not learn: {', '.join(silent)}" if silent else ""
-    told = [row(case) for case in claim.cases(found)]
-    listed = [number_row(number, found) for number in claim.invented or ()]
+    strongest = {name: max(of, key=lambda case: (case.learns, *strength(case))) for name, of in groups.items()}
+    table = {
+        "cases": [row(case) for case in claim.cases(found)],
+        "invented": [number_row(number, found) for number in claim.invented or ()],
+        "measured": totals([side for case in strongest.values() for side in case.sides]),
+    }
     if against:
-        lacking = missing(claim, [max((x for x in of if x.learns), key=strength) for of in against.values()], found)
+        lacking = missing(claim, [strongest[name] for name in against], found)
         contradicted = f"contradicted by {', '.join(against)}"
         parts = (contradicted, f"but {'; '.join(lacking)}" if lacking else "", unlearned, claim.why)
-        return Verdict(DIFFERS if lacking else REFUTED, "; ".join(filter(None, parts)), told, listed)
+        return Verdict(DIFFERS if lacking else REFUTED, "; ".join(filter(None, parts)), **table)
     if agreeing and len(agreeing) >= claim.about:
-        return Verdict(CONFIRMED, claim.why, told, listed)
+        return Verdict(CONFIRMED, claim.why, **table)
     so_far = f"so far {len(agreeing)} of {claim.about} cases, and all confirm it" if agreeing else ""
-    return Verdict(UNMEASURED, "; ".join(filter(None, (so_far, unlearned, claim.why))), told, listed)
+    return Verdict(UNMEASURED, "; ".join(filter(None, (so_far, unlearned, claim.why))), **table)
+
+
+def totals(sides: Sequence[Side]) -> dict[str, str]:
+    """The ranges of seeds and of steps, in millions, and of the steps that the paper gives."""
+    counts, steps = [side.seeds for side in sides], [x for side in sides for x in side.steps]
+    claimed = [side.claimed for side in sides if side.claimed is not None]
+    seeds = " to ".join(map(str, sorted({min(counts), max(counts)}))) if counts else "-"
+    return {
+        "seeds": seeds,
+        "M steps": span(steps) if steps else "-",
+        "M steps, theirs": span(claimed) if claimed else "-",
+    }
 
 
 def strength(case: Case) -> tuple[int, bool]:
@@ -197,10 +215,10 @@ def row(case: Case) -> dict[str, str]:
         "case": case.name,
         "with": case.under,
         "ours": case.ours,
-        "says": "no word: does not learn" if not case.learns else "the same" if case.agrees else "otherwise",
+        "agrees": "does not learn" if not case.learns else "yes" if case.agrees else "no",
         "seeds": " / ".join(str(side.seeds) for side in case.sides) or "-",
         "M steps": " / ".join(span(side.steps) for side in case.sides if side.steps) or "-",
-        "theirs": " / ".join(claimed) or "-",
+        "M steps, theirs": " / ".join(claimed) or "-",
     }
 
 

@@ -44,8 +44,8 @@ def speed_rows(found: Found) -> list[dict[str, str]]:
 
 SPEED = Experiment(
     "speed",
-    "Frames per second",
-    "table *training FPS, total time steps, training time for PPO and BPTT*",
+    "Training FPS, time steps and training time",
+    "table of this content",
     (
         Claim(
             "The difference in FPS between PPO and BPTT is minimal",
@@ -110,7 +110,7 @@ def hour_rows(found: Found) -> list[dict[str, str]]:
 HOURS = Experiment(
     "hours",
     "Their hours, our seconds",
-    "table *training FPS, total time steps, training time for PPO and BPTT*",
+    "table of training FPS, time steps and training time",
     (
         Claim(
             "Training time to convergence: landing and racing",

@@ -60,7 +60,7 @@ def landing_rows(found: Found) -> list[dict[str, str]]:
             at = runs[0]["flights"].get(width, {}).get(number) if runs else None
             row[width] = f"{100 * at['success']:.1f}" if at else UNMEASURED
         out.append(row)
-    for variant in (PAPER, LARGE, OURS):
+    for variant in (PAPER, AUTHORS, LARGE, OURS):
         own = found.of(variant=variant)
         row = {"policy": variant, "pad": "any", "seeds": str(len(own))} | dict.fromkeys(PADS, "-")
         row["0.5 m"] = percents([shipped(one) for one in own]) if own else UNMEASURED
@@ -70,8 +70,8 @@ def landing_rows(found: Found) -> list[dict[str, str]]:
 
 LANDING = Experiment(
     "landing",
-    "Visual landing by shape and size",
-    "figures *Simulation result of vision-based landing* and *Reward and success rate curves of visual tasks*",
+    "Simulation result of vision-based landing",
+    "figure of this caption; figure *Reward and success rate curves of visual tasks*",
     (
         Claim("One policy lands on triangles, circles and squares", "all three", every_pad, 3, NUMBERS,
               "pads of 50 cm, one policy, 1000 starts"),
@@ -165,8 +165,8 @@ def racing_rows(found: Found) -> list[dict[str, str]]:
 
 RACING = Experiment(
     "racing",
-    "Racing in clutter on the three tracks",
-    "figures *Simulation result of racing with obstacles* and *Reward and success rate curves of visual tasks*",
+    "Simulation result of racing with obstacles",
+    "figure of this caption; figure *Reward and success rate curves of visual tasks*",
     (
         Claim(
             "PPO with a curriculum reaches 100 % on all three tracks",
