@@ -36,8 +36,8 @@ TRACKS = {"s_shaped": "S-shaped", "circle_3d": "3D circle", "j_shaped": "J-shape
 PADS = {2.0: "triangle", 0.0: "disc", 1.0: "square"}
 """In the paper's order, by the number that an episode draws."""
 EPISODES = 12
-POSES, IMAGES = 7, 5
-"""Poses and images of a landing."""
+POSES, IMAGES, BEFORE = 7, 5, 0.88
+"""Poses and images of a landing, and the share of it at which the last image is: on the pad nothing else is seen."""
 ARMS = 0.11 * np.array([[1.0, 1, 0], [-1, -1, 0], [1, -1, 0], [-1, 1, 0]])
 """Ends of the two arms as they are drawn, body, m."""
 
@@ -142,15 +142,15 @@ def landing() -> None:
     """docs/paper_landing.png: from the side, poses on the way to each shape of pad; beside them what the camera saw."""
     known = flown("land_visual")
     flights, outline = known.flights, known.drawn["pad_outline"]
-    notes = ["one policy; left: poses from the side, right: the segmentation that it saw, first to last"]
+    notes = ["one policy; left: poses from the side, coloured by speed; right: the segmentation that it saw"]
     with figure(DOCS / "paper_landing.png", "Vision-based landing", 7.6, notes) as fig:
-        axes = fig.subplots(3, 1 + IMAGES, width_ratios=[2.6, *[1.0] * IMAGES])
+        axes = fig.subplots(3, 1 + IMAGES, width_ratios=[1.7, *[1.0] * IMAGES])
         for row, (number, name) in zip(axes, PADS.items(), strict=True):
             i = next(i for i in range(EPISODES) if outline[i] == number and flights.success[i])
             k = int(flights.length[i])
             poses(row[0], flights, i, float(known.drawn["pad_width_m"][i]))
             row[0].set_title(f"{name}, {100 * known.drawn['pad_width_m'][i]:.0f} cm wide")
-            for ax, t in zip(row[1:], np.linspace(0, k - 1, IMAGES).round().astype(int), strict=True):
+            for ax, t in zip(row[1:], np.linspace(0, BEFORE * (k - 1), IMAGES).round().astype(int), strict=True):
                 image = np.repeat(flights.images[0][t, i][..., None], 3, axis=-1)
                 show(ax, "mask", image, known.cameras[0], f"{flights.time[t]:.1f} s")
                 for spine in ax.spines.values():
