@@ -1,7 +1,7 @@
 """The algorithms on probe problems with known answers; GAE by hand."""
 
 import dataclasses
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -208,7 +208,8 @@ def test_what_is_shipped_is_the_running_mean_of_what_learns() -> None:
     jax.tree.map(np.testing.assert_array_equal, averaged.learner, learners[-1])
 
 
-def test_learning_rate_falls_exponentially() -> None:
-    config = PPOConfig(learning_rate=1e-2, learning_rate_end=1e-4)
+@pytest.mark.parametrize(("decay", "middle"), [("exponential", 1e-3), ("linear", 5.05e-3)])
+def test_learning_rate_falls_as_the_options_say(decay: Literal["exponential", "linear"], middle: float) -> None:
+    config = PPOConfig(learning_rate=1e-2, learning_rate_end=1e-4, decay=decay)
     rates = [float(annealed(config, jnp.float32(p))) for p in (0.0, 0.5, 1.0)]
-    np.testing.assert_allclose(rates, [1e-2, 1e-3, 1e-4], rtol=1e-5)
+    np.testing.assert_allclose(rates, [1e-2, middle, 1e-4], rtol=1e-5)

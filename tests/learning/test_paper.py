@@ -14,8 +14,6 @@ from typing import Any
 
 import pytest
 
-from e2efly.environment import Env
-from e2efly.runs import presets
 from tests.conftest import QUICK
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -148,18 +146,6 @@ def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(
     assert second["cpu_seconds"] > first["cpu_seconds"] > 0
     assert not wanted(one, 0, 1, [{**known[0], **second}], How(tmp_path))
     assert figures(out) == second
-
-
-def test_the_papers_observations_have_13_13_40_and_16_numbers() -> None:
-    for task, size in (("hover", 13), ("land", 13), ("track", 40), ("race", 16)):
-        config = presets.preset(task, "ppo", presets.PAPER)
-        whole = Env.of(config.task, config.reward, config.env)
-        env = Env.of(config.task, config.reward, paper_env(config.env))
-        assert env.observation_size == size < whole.observation_size
-
-
-def paper_env(env: Any) -> Any:
-    return dataclasses.replace(env, past_actions=0)
 
 
 def test_the_file_and_the_page_are_what_the_rules_say_of_the_runs() -> None:

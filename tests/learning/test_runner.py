@@ -282,12 +282,13 @@ def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> 
 
 
 NOT_IN_THE_PAPER = ("hover_aware", "gap")
+BY_THE_PAPER = ("ppo", "bptt", "abpt")
 
 
 @pytest.mark.parametrize(
     ("name", "task", "algo"),
     [("nominal", t, a) for t in TASKS for a in ALGORITHMS]
-    + [("paper", t, a) for t in TASKS if t not in NOT_IN_THE_PAPER for a in ("ppo", "bptt", "abpt")]
+    + [(p, t, a) for p in ("paper", "authors") for t in TASKS if t not in NOT_IN_THE_PAPER for a in BY_THE_PAPER]
     + [("thrown", "hover", a) for a in ALGORITHMS],
 )
 def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: str) -> None:

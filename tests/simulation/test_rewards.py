@@ -65,6 +65,7 @@ BY_HAND = {
     "goal": 1,
     "crash": -1,
     "near": np.exp(-13) + 0.5 * np.exp(-8 * 13),
+    "alive": 1,
     "anglev_sq": -9,
     "act2_sq": -0.25,
     "descent": -abs(0.5 / (1 + 25 / 0.09) - 6),

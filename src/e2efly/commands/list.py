@@ -64,7 +64,7 @@ def _described(kind: str, things: Iterable[tuple[str, Any]]) -> Rows:
 
 
 def _presets() -> Rows:
-    field = {presets.ROBUST: "robust", presets.IDENTIFIED: "family", presets.PAPER: "paper"}
+    field = {presets.ROBUST: "robust", presets.IDENTIFIED: "family", presets.PAPER: "paper", presets.AUTHORS: "paper"}
 
     def has(task: Any, name: str) -> bool:
         return name == presets.NOMINAL or name in task.variants or bool(getattr(task, field.get(name, ""), None))

@@ -25,6 +25,7 @@ from e2efly.config.env import (
 from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.random_worlds import CLUTTER, ClutterConfig, ForestConfig
 from e2efly.config.run import (
+    Given,
     NetworkConfig,
     Paper,
     RewardConfig,
@@ -47,6 +48,7 @@ __all__ = [
     "EnvConfig",
     "FOPPOConfig",
     "ForestConfig",
+    "Given",
     "ImageNoiseConfig",
     "ImuConfig",
     "NetworkConfig",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 from e2efly.config.numbers import check_fields, number
 from e2efly.config.registry import Registry
@@ -76,7 +76,19 @@ def _check_minibatch(steps: int, minibatch: int) -> None:
 
 
 @dataclass(frozen=True)
-class _FirstOrder(AlgorithmConfig):
+class _Annealed(AlgorithmConfig):
+    """Options of every algorithm whose learning rate changes over a run."""
+
+    learning_rate: float = number(4e-3, above=0, high=1.0)
+    """Learning rate of Adam at the start."""
+    learning_rate_end: float = number(1e-4, above=0, high=1.0)
+    """Learning rate of Adam at the end."""
+    decay: Literal["exponential", "linear"] = "exponential"
+    """How the learning rate changes in between (sets the program)."""
+
+
+@dataclass(frozen=True)
+class _FirstOrder(_Annealed):
     """Options of every algorithm that differentiates the simulator."""
 
     exact: ClassVar = True
@@ -98,7 +110,7 @@ class _FirstOrder(AlgorithmConfig):
 
 
 @dataclass(frozen=True)
-class _Proximal(AlgorithmConfig):
+class _Proximal(_Annealed):
     """Options of proximal policy optimisation and of algorithms that build on it."""
 
     epochs: int = number(2, above=0)
@@ -111,7 +123,7 @@ class _Proximal(AlgorithmConfig):
     learning_rate: float = number(3e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""
     learning_rate_end: float = number(3e-4, above=0, high=1.0)
-    """Learning rate of Adam at the end. It changes exponentially in between."""
+    """Learning rate of Adam at the end."""
     gae_lambda: float = number(0.95, high=1)
     """Lambda of the generalised advantage estimate."""
     clip: float = number(0.2, high=10.0)
@@ -147,10 +159,6 @@ class BPTTConfig(_FirstOrder):
 
     program: ClassVar = "e2efly.learning.bptt:BPTT"
 
-    learning_rate: float = number(4e-3, above=0, high=1.0)
-    """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0, high=1.0)
-    """Learning rate of Adam at the end. It changes exponentially in between."""
     gamma: float = number(0.99, above=0, high=1)
     """Discount per step within the window."""
     average: float | None = number(None, high=0.9999)
@@ -171,10 +179,6 @@ class SHACConfig(_FirstOrder):
     """Passes of the critic over the samples of a window (sets shapes)."""
     minibatch: int = number(512, above=0)
     """Samples per gradient step of the critic; must divide envs * horizon (sets shapes)."""
-    learning_rate: float = number(4e-3, above=0, high=1.0)
-    """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0, high=1.0)
-    """Learning rate of Adam at the end. It changes exponentially in between."""
     critic_rate: float = number(0.5, high=1e3)
     """The critic's learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)
@@ -213,10 +217,6 @@ class ABPTConfig(_FirstOrder):
     """Samples per gradient step of the critics (sets shapes)."""
     fits: int = number(8, above=0)
     """Gradient steps of the critics per update (sets shapes)."""
-    learning_rate: float = number(4e-3, above=0, high=1.0)
-    """Learning rate of Adam at the start."""
-    learning_rate_end: float = number(1e-4, above=0, high=1.0)
-    """Learning rate of Adam at the end. It changes exponentially in between."""
     critic_rate: float = number(0.5, high=1e3)
     """The critics' learning rate relative to the policy's."""
     gamma: float = number(0.98, above=0, high=1)

@@ -60,16 +60,38 @@ class StageConfig:
     """Promotion at the latest after so many environment steps."""
 
 
+VISFLY = "SJTU-ViSYS-team/VisFly at 6ff29bf"
+CRL_RACING = "SJTU-ViSYS-team/CRL-Drone-Racing at 11924fa"
+"""The repositories of the paper's authors, as they were read on 2026-11-27."""
+OURS = "ours: the paper names the term, but no weight"
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value of a preset that is not in the paper, and where it is from."""
+
+    field: str
+    """Dotted name of the field of `TrainConfig`. Of a reward: `reward.weights.NAME`."""
+    value: Any
+    """The value."""
+    source: str
+    """The public page or file that has it, or why it was chosen."""
+    algo: str = ""
+    """The algorithm that it is for. Empty: all."""
+
+
 @dataclass(frozen=True)
 class Paper:
-    """The paper's values for the training of a task (from its tables)."""
+    """The values for the training of a task as in the paper: the presets `paper` and `authors`."""
 
     weights: Mapping[str, float]
-    """Weights of the reward."""
-    ppo: Mapping[str, float]
-    """Weights that PPO has in addition."""
+    """Weights of the reward (from the paper's tables)."""
     millions: tuple[int, int]
-    """Environment steps for PPO and for BPTT, in millions."""
+    """Environment steps for PPO and for BPTT, in millions (from the paper)."""
+    silent: tuple[Given, ...] = ()
+    """Values that a training needs and the paper does not give."""
+    authors: tuple[Given, ...] = ()
+    """Values of its authors' public code, which the preset `authors` has in addition."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,6 +269,11 @@ class TaskConfig:
     def own_worlds(self) -> bool:
         """Whether each episode has its own world, for plots."""
         return False
+
+    def shows(self, name: str) -> bool:
+        """Whether the policy observes the task's own field of this name."""
+        del name
+        return True
 
     def showing(self, names: Sequence[str]) -> "TaskConfig":
         """These options, adapted to a policy whose observation has fields with these names, if the task has several

@@ -217,8 +217,13 @@ def episode_metrics(done: Array, success: Array) -> dict[str, Array]:
 
 
 def annealed(config: Any, progress: Float[Array, ""]) -> Float[Array, ""]:
-    """The learning rate, which changes exponentially from `learning_rate` to `learning_rate_end`."""
-    return config.learning_rate * (config.learning_rate_end / config.learning_rate) ** progress
+    """The learning rate, which changes from `learning_rate` to `learning_rate_end` as `decay` says: exponentially,
+    unless the options have it otherwise.
+    """
+    first, last = config.learning_rate, config.learning_rate_end
+    if getattr(config, "decay", "exponential") == "linear":
+        return first + (last - first) * progress
+    return first * (last / first) ** progress
 
 
 METHODS = ("init", "update", "optimizer", "replay")

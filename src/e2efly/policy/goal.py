@@ -111,13 +111,18 @@ class Goal:
         return cls
 
     @property
+    def shown(self) -> tuple[Observed, ...]:
+        """The task's own observation fields that its options show."""
+        return tuple(row for row in self.observation if self.config.shows(row[0].name))
+
+    @property
     def fields(self) -> tuple[Field, ...]:
         """The task's own fields of the observation."""
-        return tuple(shown for shown, _ in self.observation)
+        return tuple(field for field, _ in self.shown)
 
     def observe(self, memory: Any, time: Array, state: Any) -> Array:
         """(n, o) the task's own observation fields, for the body state that the policy is given."""
-        parts = [value(self, memory, time, state) for _, value in self.observation]
+        parts = [value(self, memory, time, state) for _, value in self.shown]
         return parts[0] if len(parts) == 1 else namespace(*parts).concatenate(parts, axis=-1)
 
     @classmethod

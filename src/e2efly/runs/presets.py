@@ -9,12 +9,9 @@ from typing import Any
 
 from e2efly.config import (
     ALGORITHMS,
-    ABPTConfig,
     AlgorithmConfig,
-    BPTTConfig,
     DisturbanceConfig,
     EnvConfig,
-    PPOConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
@@ -26,12 +23,13 @@ from e2efly.config.tables import LARGEST
 from e2efly.policy import zoo
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
+from e2efly.runs.paper import authors, papers
 from e2efly.tasks import TASKS
 from e2efly.vehicles import posterior
 from e2efly.vehicles.family import load_family
 from e2efly.vehicles.loading import load_vehicle
 
-ROBUST, IDENTIFIED, NOMINAL, PAPER = "robust", "identified", "nominal", "paper"
+ROBUST, IDENTIFIED, NOMINAL, PAPER, AUTHORS = "robust", "identified", "nominal", "paper", "authors"
 FAMILY = "any"
 """The family whose policies of the zoo are the starting points of the preset `identified`."""
 OTHERS = EnvConfig(
@@ -70,7 +68,8 @@ them."""
 
 def names() -> tuple[str, ...]:
     """The names of all presets. Not every task has each."""
-    return ROBUST, IDENTIFIED, NOMINAL, PAPER, *dict.fromkeys(name for task in TASKS.values() for name in task.variants)
+    own = dict.fromkeys(name for task in TASKS.values() for name in task.variants)
+    return ROBUST, IDENTIFIED, NOMINAL, PAPER, AUTHORS, *own
 
 
 def completed(
@@ -133,7 +132,9 @@ def preset(task: str, algo: str, name: str = NOMINAL) -> TrainConfig:
     if name not in names():
         raise ValueError(unknown("preset", name, names()))
     if name == PAPER:
-        return _paper(options, learner.name)
+        return papers(options, learner.name)
+    if name == AUTHORS:
+        return authors(options, learner.name)
     config = _nominal(options, learner)
     if name == NOMINAL:
         return config
@@ -192,36 +193,6 @@ def _having(recipes: str) -> str:
     """The tasks that have a recipe, with the algorithms of each recipe."""
     found = {name: getattr(known, recipes) for name, known in TASKS.items()}
     return ", ".join(f"{name} by {' or '.join(by)}" for name, by in found.items() if by)
-
-
-def _paper(task: type[TaskConfig], algo: str) -> TrainConfig:
-    """The paper's rewards, sizes and learning rates (its tables; docs/rewards.md lists what it does not give)."""
-    if algo not in ("ppo", "bptt", "abpt"):
-        raise ValueError(f"preset 'paper': the paper does not train by {algo!r}; accepted: ppo, bptt, abpt")
-    given = task.paper
-    if given is None:
-        having = ", ".join(name for name, known in TASKS.items() if known.paper is not None)
-        raise ValueError(f"preset 'paper': the paper has no reward for task {task.name!r}; accepted: {having}")
-    weights = dict(given.weights)
-    if algo == "ppo":
-        weights |= given.ppo
-        settings: AlgorithmConfig = PPOConfig(
-            envs=100, horizon=256, minibatch=25_600, epochs=10, learning_rate=1e-4, learning_rate_end=1e-5,
-            gamma=0.99,
-        )  # fmt: skip
-    elif algo == "abpt":
-        settings = ABPTConfig(
-            envs=100, horizon=96, collect=10, buffer=100_000, places=1000, minibatch=25_600, learning_rate=1e-3,
-            learning_rate_end=1e-5, critic_rate=1.0, gamma=0.99, target_share=0.005,
-        )  # fmt: skip
-    else:
-        settings = BPTTConfig(envs=100, horizon=96, learning_rate=1e-3, learning_rate_end=1e-5)
-    steps = given.millions[algo != "ppo"] * 1_000_000
-    seen = tuple(dataclasses.replace(camera, width=64, height=64) for camera in task.cameras)
-    return TrainConfig(
-        task.training(), settings, RewardConfig(weights), EnvConfig(cameras=seen), steps=steps, chunk=10,
-        curriculum=task.curriculum,
-    )  # fmt: skip
 
 
 def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:

@@ -216,6 +216,11 @@ def near(offset: Vector, near_steepness: float | Array = 8.0) -> Scalar:
     return jnp.exp(-d) + 0.5 * jnp.exp(-near_steepness * d)
 
 
+def alive(height: Scalar) -> Scalar:
+    """1 in every step. Not in the paper; its authors' public environments have it (docs/paper.md)."""
+    return jnp.ones_like(height)
+
+
 def anglev_sq(body_rate: Vector) -> Scalar:
     """Minus the squared body rate, (rad/s)^2: smooth at zero. Ours."""
     return -jnp.sum(body_rate**2, axis=-1)
@@ -303,7 +308,7 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright, imitate, vel, overspeed, progway,
+        anglev_sq, act2_sq, upright, imitate, vel, overspeed, progway, alive,
     ),
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, descent, fit, fitlog),
     "sparse": (goal, crash),

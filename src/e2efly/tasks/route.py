@@ -59,7 +59,9 @@ class Route:
 
     def course_of(self, contract: Contract, shape: Shape) -> Course:
         """The course for a policy. If a task has several kinds of observation, the course uses that of this policy."""
-        return self.course(shape, 1 / contract.control_rate_hz)
+        course = self.course(shape, 1 / contract.control_rate_hz)
+        options = course.goal.config.showing([field.name for field in contract.observation])
+        return dataclasses.replace(course, goal=dataclasses.replace(course.goal, config=options))
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "Route":
@@ -116,9 +118,12 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
     Raises:
         ValueError: for a task that cannot be found.
     """
-    goal = goal_of(TASKS.find(contract.task))
-    goal = goal.showing([field.name for field in contract.observation]) if hasattr(goal, "showing") else goal
-    return tuple(shown for shown, _ in goal.observation) or goal.fields  # type: ignore[return-value]
+    goal, names = goal_of(TASKS.find(contract.task)), [field.name for field in contract.observation]
+    goal = goal.showing(names) if hasattr(goal, "showing") else goal
+    if not goal.observation:
+        return goal.fields  # type: ignore[return-value]
+    options = TASKS.find(contract.task)().showing(names)
+    return tuple(field for field, _ in goal.observation if options.shows(field.name))
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:

@@ -10,6 +10,7 @@ from e2efly.config import (
     BPTTConfig,
     EnvConfig,
     ForestConfig,
+    Given,
     ImageNoiseConfig,
     NetworkConfig,
     Paper,
@@ -23,6 +24,7 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
+from e2efly.config.run import CRL_RACING
 from e2efly.tasks.registry import register
 
 
@@ -44,8 +46,13 @@ class AvoidConfig(TaskConfig):
     )
     paper: ClassVar = Paper(
         weights={"prog1": 0.9, "ori1": 0.04, "v3": 0.002, "anglev": 0.002, "avoid2": 0.01},
-        ppo={"goal": 5.0, "crash": 4.0},
         millions=(100, 50),
+        silent=(
+            Given("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
+            Given("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
+            Given("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
+        ),
+        authors=(Given("task.episode_s", 20.0, "ours: the whole forest must fit into an episode"),),
     )
 
     episode_s: float = 20.0

@@ -7,11 +7,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from e2efly.config import BPTTConfig, EnvConfig, Paper, PPOConfig, RewardConfig, Robust, TaskConfig, TrainConfig, number
+from e2efly.config import (
+    BPTTConfig,
+    EnvConfig,
+    Given,
+    Paper,
+    PPOConfig,
+    RewardConfig,
+    Robust,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import INK, Line, Mark, Thing, circle
 from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
-from e2efly.config.run import check_aloft, check_counted
+from e2efly.config.run import OURS, VISFLY, check_aloft, check_counted
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 
@@ -52,8 +63,25 @@ class HoverConfig(TaskConfig):
     )
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
-        ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
         millions=(50, 10),
+        silent=(
+            Given("reward.weights.alive", 0.1, f"{VISFLY}: envs/HoverEnv.py, base_r"),
+            Given("reward.weights.act3", 1.0, OURS, "ppo"),
+            Given("reward.weights.goal", 1.0, OURS, "ppo"),
+            Given("reward.weights.crash", 1.0, OURS, "ppo"),
+        ),
+        authors=(
+            Given("reward.weights.prog2", 0.1 / 9, f"{VISFLY}: envs/HoverEnv.py, pos_factor"),
+            Given("reward.weights.ori2", 0.00001, f"{VISFLY}: envs/HoverEnv.py"),
+            Given("reward.weights.act3", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
+            Given("reward.weights.goal", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
+            Given("reward.weights.crash", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
+            Given("task.target", (0.0, 0.0, 1.5), f"{VISFLY}: envs/HoverEnv.py, target"),
+            Given("task.position", 1.0, f"{VISFLY}: envs/HoverEnv.py, half of the starts; theirs is 0.5 m in z"),
+            Given("task.velocity", 0.0, f"{VISFLY}: envs/HoverEnv.py, starts at rest"),
+            Given("task.tilt", 0.0, f"{VISFLY}: envs/HoverEnv.py, level starts"),
+            Given("task.body_rate", 0.0, f"{VISFLY}: envs/HoverEnv.py, starts at rest"),
+        ),
     )
 
     episode_s: float = 8.0

@@ -8,6 +8,7 @@ import numpy as np
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
+    Given,
     Paper,
     PPOConfig,
     RewardConfig,
@@ -19,6 +20,7 @@ from e2efly.config import (
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import INK, ORANGE, Face, Line, Thing, circle
 from e2efly.config.numbers import ANGLE, SPEED
+from e2efly.config.run import OURS, VISFLY
 from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 
@@ -26,6 +28,24 @@ PPO_WEIGHTS = {
     "prog1": 4.0, "descent": 0.2, "upright": 0.05, "anglev_sq": 0.002, "act2_sq": 0.02, "goal": 10.0, "crash": 10.0,
 }  # fmt: skip
 """Weights of the reward with which PPO learns to land."""
+
+
+PAPER_SILENT = (
+    Given("reward.weights.act3", 1.0, OURS, "ppo"),
+    Given("reward.weights.goal", 20.0, f"{VISFLY}: envs/LandingEnv.py, r_s", "ppo"),
+    Given("reward.weights.crash", 0.1, f"{VISFLY}: envs/LandingEnv.py, r_l", "ppo"),
+)
+"""Values of both landings that the paper does not give."""
+PAPER_AUTHORS = (
+    Given("task.must_touch", False, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Given("task.radius", 0.3, f"{VISFLY}: envs/LandingEnv.py, landing_half; theirs is a square"),
+    Given("task.height_error", 0.2, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Given("task.speed", 0.3, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Given("task.tilt", 3.14, f"{VISFLY}: envs/LandingEnv.py, get_success asks for no attitude"),
+    Given("task.velocity", 0.0, f"{VISFLY}: envs/LandingEnv.py, starts at rest"),
+    Given("task.episode_s", 3.84, f"{VISFLY}: envs/LandingEnv.py, max_episode_steps 128 of 0.03 s"),
+)
+"""Values of both landings in the authors' public code."""
 
 
 @register("land")
@@ -53,8 +73,13 @@ class LandConfig(TaskConfig):
     }
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
-        ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
         millions=(100, 10),
+        silent=PAPER_SILENT,
+        authors=(
+            *PAPER_AUTHORS,
+            Given("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
+            Given("task.sideways", 1.0, f"{VISFLY}: envs/LandingEnv.py, half of the starts"),
+        ),
     )
 
     episode_s: float = 10.0
@@ -73,6 +98,8 @@ class LandConfig(TaskConfig):
     """Success: largest speed at touchdown, m/s."""
     tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
+    must_touch: bool = True
+    """Success: whether the vehicle has to touch. Without it, being as near, as slow and as upright is enough."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
 

@@ -78,7 +78,8 @@ class LandGoal(Landing):
 
 
 def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
-    """The verdict on a landing, by `radius`, `height_error`, `speed` and `tilt` of the options, and their `fence`.
+    """The verdict on a landing, by `radius`, `height_error`, `speed`, `tilt` and `must_touch` of the options, and their
+    `fence`.
 
     `goal` is the position of the vehicles after landing. `touched` marks those that touch the pad or the ground.
     """
@@ -86,7 +87,7 @@ def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
     offset = body.position - goal
     sideways = xp.linalg.norm(offset[:, :2], axis=-1)
     success = (
-        touched
+        (touched | (config.must_touch < 1))
         & (sideways < config.radius)
         & (xp.abs(offset[:, 2]) < config.height_error)
         & (xp.linalg.norm(body.velocity, axis=-1) < config.speed)
@@ -94,7 +95,7 @@ def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
     )
     lost = (sideways > config.fence) | (offset[:, 2] > config.fence)
     return Outcome(
-        terminated=touched | lost, success=success, arrived=success, crashed=(touched & ~success) | lost,
+        terminated=touched | lost | success, success=success, arrived=success, crashed=(touched & ~success) | lost,
         error=sideways, signals={"touched": touched},
     )  # fmt: skip
 

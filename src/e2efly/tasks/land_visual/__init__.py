@@ -1,7 +1,8 @@
 """Options and recipes: touch down gently on a pad, seen only by a camera."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from e2efly.config import (
@@ -9,6 +10,7 @@ from e2efly.config import (
     BPTTConfig,
     CameraConfig,
     EnvConfig,
+    Given,
     NetworkConfig,
     Paper,
     PPOConfig,
@@ -17,11 +19,13 @@ from e2efly.config import (
     TaskConfig,
     TrainConfig,
     number,
+    shape,
 )
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import ANGLE, SPEED
+from e2efly.config.run import VISFLY
 from e2efly.courses import defaults
-from e2efly.tasks.land import PPO_WEIGHTS
+from e2efly.tasks.land import PAPER_AUTHORS, PAPER_SILENT, PPO_WEIGHTS
 from e2efly.tasks.registry import register
 
 
@@ -38,8 +42,15 @@ class LandVisualConfig(TaskConfig):
     cameras: ClassVar = (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),)
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "ori2": 0.003, "vz": 0.1, "anglev": 0.001},
-        ppo={"act3": 1.0, "goal": 1.0, "crash": 1.0},
         millions=(100, 1),
+        silent=(
+            *PAPER_SILENT,
+            Given("task.shows_position", True, "the paper's table; its text says that no target is observed"),
+        ),
+        authors=(
+            *PAPER_AUTHORS,
+            Given("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
+        ),
     )
 
     episode_s: float = 10.0
@@ -62,8 +73,21 @@ class LandVisualConfig(TaskConfig):
     """Success: largest speed at touchdown, m/s."""
     tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
+    must_touch: bool = True
+    """Success: whether the vehicle has to touch. Without it, being as near, as slow and as upright is enough."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
+    shows_position: bool = shape(False)
+    """Whether the policy sees where the pad is, and not only the height. With it, its observation beside the image is
+    that of the paper's table: 13 numbers, with env.past_actions 0."""
+
+    def shows(self, name: str) -> bool:
+        """The position of the pad by choice."""
+        return name == ("position_error" if self.shows_position else "height")
+
+    def showing(self, names: Sequence[str]) -> "LandVisualConfig":
+        """For a policy with or without the position of the pad."""
+        return replace(self, shows_position="position_error" in names)
 
     def domain(self) -> Domain:
         """The pad."""

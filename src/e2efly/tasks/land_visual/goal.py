@@ -15,7 +15,9 @@ from e2efly.tasks.land_visual import LandVisualConfig
 
 @dataclass(frozen=True)
 class LandVisualGoal(Landing):
-    """Land on a pad at the world's origin, whose position the policy gets only from its camera."""
+    """Land on a pad at the world's origin. The policy gets its position only from its camera, unless the options show
+    it.
+    """
 
     config: LandVisualConfig
     shape: Shape
@@ -34,7 +36,17 @@ class LandVisualGoal(Landing):
         """Height of the feet above the ground."""
         return body.position[:, 2:] - self.shape.feet_height
 
-    observation = ((Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"), height),)
+    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
+        """Goal minus position."""
+        return self.goal(memory, time) - body.position
+
+    observation = (
+        (Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"), height),
+        (
+            Field("position_error", 3, "world", "m", 1.0, "where the centre of mass is on the pad, minus where it is"),
+            position_error,
+        ),
+    )
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """The verdict without knowledge of the pad's outline. The pad counts as a disc of the largest width."""

@@ -10,6 +10,7 @@ import numpy as np
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
+    Given,
     NetworkConfig,
     Paper,
     PPOConfig,
@@ -22,6 +23,7 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain, track_domain
 from e2efly.config.drawing import ORANGE, Face, Mark, Thing
+from e2efly.config.run import OURS, VISFLY
 from e2efly.courses import defaults
 from e2efly.courses.gates import FRAME, Gates
 from e2efly.courses.random_tracks import DOMAIN
@@ -71,8 +73,19 @@ class RaceConfig(TaskConfig):
     asked: ClassVar = {("track", ANY): ANY_TRACK}
     paper: ClassVar = Paper(
         weights={"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
-        ppo={"act3": 1.0, "goal": 5.0, "crash": 4.0},
         millions=(100, 50),
+        silent=(
+            Given("reward.weights.act3", 1.0, OURS, "ppo"),
+            Given("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
+            Given("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
+        ),
+        authors=(
+            Given("reward.weights.alive", 0.1, f"{VISFLY}: envs/RacingEnv.py, base_r"),
+            Given("reward.weights.goal", 20.0, f"{VISFLY}: envs/RacingEnv.py, success_r", "ppo"),
+            Given("reward.weights.crash", 0.0, f"{VISFLY}: envs/RacingEnv.py has no such term", "ppo"),
+            Given("task.position", 0.2, f"{VISFLY}: envs/RacingEnv.py, half of the starts"),
+            Given("task.episode_s", 12.0, "ours: a whole lap must fit into an episode"),
+        ),
     )
 
     episode_s: float = 12.0

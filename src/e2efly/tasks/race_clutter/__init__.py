@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -10,8 +11,10 @@ from e2efly.config import (
     D435I,
     AlgorithmConfig,
     BPTTConfig,
+    CameraConfig,
     ClutterConfig,
     EnvConfig,
+    Given,
     ImageNoiseConfig,
     NetworkConfig,
     Paper,
@@ -26,8 +29,15 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain, Extent, extent, track_domain, union
 from e2efly.config.numbers import ANGLE, SPEED
+from e2efly.config.run import CRL_RACING
 from e2efly.courses.tracks import load_track
 from e2efly.tasks.registry import register
+
+AUTHORS_CAMERA = CameraConfig(
+    "depth", 64, 64, fov=(math.pi / 2, math.pi / 2), position=(0.1, 0.0, 0.0), reach=(0.2, 10.0),
+    noise=ImageNoiseConfig(inverse_depth=0.05),
+)  # fmt: skip
+"""The depth camera of the authors' public code."""
 
 
 @register("race_clutter")
@@ -51,9 +61,24 @@ class RaceClutterConfig(TaskConfig):
         StageConfig({"clutter.obstacles": 5.0}, success=0.7, steps=2_000_000),
     )
     paper: ClassVar = Paper(
-        weights={"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01},
-        ppo={"goal": 5.0, "crash": 4.0},
+        weights={"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01, "goal": 5.0, "crash": 4.0},
         millions=(100, 50),
+        silent=(
+            Given("task.shows_axes", False, "the paper's observation has 17 numbers"),
+            Given("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
+        ),
+        authors=(
+            Given("task.scale", 1.0, f"{CRL_RACING}: envs/demo2_3Dcircle_onboard.py, a circle of 6x6 m"),
+            Given("task.speed", (2.0, 4.0), "ours: what tracks of this size allow; v_d of their code is 0.5 to 1 m/s"),
+            Given(
+                "task.clutter",
+                ClutterConfig(sideways=2.0, size=(0.15, 0.15)),
+                f"{CRL_RACING}: examples/ete_racing_sim/random_obstacle.py, 18 trees of 0.15 m",
+            ),
+            Given("task.position", 0.3, f"{CRL_RACING}: envs/demo3_U.py, half of the starts"),
+            Given("task.episode_s", 20.0, "ours: a whole lap must fit into an episode"),
+            Given("env.cameras", (AUTHORS_CAMERA,), f"{CRL_RACING}: envs/demo3_U.py, sensor_kwargs and noisy_depth"),
+        ),
     )
 
     episode_s: float = 20.0
@@ -81,6 +106,9 @@ class RaceClutterConfig(TaskConfig):
     """The episode fails farther than this from the next gate, m."""
     collisions_end: bool = True
     """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
+    shows_axes: bool = shape(True)
+    """Whether the policy sees in which direction the next two gates are flown through. Without it, its observation is
+    the paper's: 17 numbers, with env.past_actions 0."""
 
     @classmethod
     def training(cls) -> "RaceClutterConfig":
@@ -116,6 +144,14 @@ class RaceClutterConfig(TaskConfig):
             extent("obstacle_size", "m", self.clutter.size),
             extent("obstacles_moving", "1", (0.0, self.clutter.moving)),
         )
+
+    def shows(self, name: str) -> bool:
+        """The gates' axes by choice."""
+        return self.shows_axes or name != "gate_axes"
+
+    def showing(self, names: Sequence[str]) -> "RaceClutterConfig":
+        """For a policy with or without the gates' axes."""
+        return dataclasses.replace(self, shows_axes="gate_axes" in names)
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
+    Given,
     Paper,
     PPOConfig,
     RewardConfig,
@@ -19,7 +20,7 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain
 from e2efly.config.numbers import BODY_RATE, SPEED
-from e2efly.config.run import check_aloft
+from e2efly.config.run import OURS, VISFLY, check_aloft
 from e2efly.courses import defaults
 from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
 from e2efly.tasks.registry import register
@@ -56,8 +57,24 @@ class TrackConfig(TaskConfig):
     }
     paper: ClassVar = Paper(
         weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
-        ppo={"act3": 1.0, "crash": 1.0},
         millions=(50, 20),
+        silent=(
+            Given("reward.weights.alive", 0.1, f"{VISFLY}: envs/TrackingEnv.py, base_r"),
+            Given("reward.weights.act3", 1.0, OURS, "ppo"),
+            Given("reward.weights.goal", 1.0, OURS, "ppo"),
+            Given("reward.weights.crash", 1.0, OURS, "ppo"),
+        ),
+        authors=(
+            Given("reward.weights.prog2", 0.1 / 9, f"{VISFLY}: envs/TrackingEnv.py, pos_factor"),
+            Given("reward.weights.ori2", 0.00001, f"{VISFLY}: envs/TrackingEnv.py"),
+            Given("reward.weights.act3", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
+            Given("reward.weights.goal", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
+            Given("reward.weights.crash", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
+            Given("task.reference", "circle", f"{VISFLY}: envs/TrackingEnv.py, radius 2 m, 0.2 pi rad/s"),
+            Given("task.centre", (0.0, 0.0, 1.0), f"{VISFLY}: envs/TrackingEnv.py, centre"),
+            Given("task.position", 0.2, f"{VISFLY}: envs/TrackingEnv.py; theirs is around the circle's centre"),
+            Given("task.velocity", 0.0, f"{VISFLY}: envs/TrackingEnv.py, starts at rest"),
+        ),
     )
 
     episode_s: float = 10.0

@@ -104,9 +104,7 @@ class TrackGoal(Goal):
         crashed = (error > c.fence) | touches_ground(self.shape, after)
         mean = memory.error_sum / memory.steps.clip(1.0)
         success = timed_out & ~crashed & (mean < c.mean_error)
-        return memory, Outcome(
-            terminated=crashed, success=success, arrived=crashed & ~crashed, crashed=crashed, error=error
-        )
+        return memory, Outcome(terminated=crashed, success=success, arrived=success, crashed=crashed, error=error)
 
 
 _CURVE = ("centre", "radius", "phase", "duration")
