@@ -2,7 +2,7 @@
 
     python benchmarks/paper.py EXPERIMENT... [--seeds N] [--tasks hover ...] [--algos bptt ...] [--variants TEXT ...]
                                [--most STEPS] [--stop SUCCESS] [--device cpu|gpu] [--runs FOLDER] [--again] [--short]
-                               [--json FILE]
+                               [--add FILE ...] [--json FILE]
     python benchmarks/paper.py                # judges anew what is there already
 
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
@@ -46,6 +46,16 @@ def read(path: Path) -> dict[str, Any]:
     known = json.loads(path.read_text()) if path.exists() else {}
     nothing = {"machine": None, "date": None, "runs": []}
     return {name: {part: known.get(name, nothing)[part] for part in nothing} for name in EXPERIMENTS}
+
+
+def joined(known: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """All runs of two files; of a run that both have, that of the other file, and its machine and day."""
+    out = {}
+    for name, own in known.items():
+        anew = {key(one) for one in other[name]["runs"]}
+        kept = [one for one in own["runs"] if key(one) not in anew]
+        out[name] = {**(other[name] if anew else own), "runs": [*kept, *other[name]["runs"]]}
+    return out
 
 
 def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
@@ -120,6 +130,7 @@ def parsed() -> argparse.Namespace:
     )
     add("--again", action="store_true", help="repeat what is there already")
     add("--short", action="store_true", help="a tiny run or two of each experiment")
+    add("--add", type=Path, nargs="*", default=[], help="files of other runs, which join those of --json")
     add("--json", type=Path, default=FILE, help=f"the figures; left out: {FILE.name} beside the others")
     options = parser.parse_args()
     for name in options.experiments:
@@ -143,6 +154,8 @@ def main() -> None:
             for name in options.experiments:
                 measure(EXPERIMENTS[name], options, how)
     known = read(options.json)
+    for file in options.add:
+        known = joined(known, read(file))
     write(options.json, known)
     for name in options.experiments or EXPERIMENTS:
         result = judged(EXPERIMENTS[name], known[name]["runs"])

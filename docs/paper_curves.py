@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from PIL import Image
 
 from e2efly.config.drawing import INK
-from e2efly.viewing.style import CYCLE, figure
+from e2efly.viewing.style import CYCLE, figure, say
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results"
@@ -74,6 +74,8 @@ def learning(runs: Sequence[Run], preset: str) -> Path | None:
                 if style == "-":
                     spread(reward, own, "return", **look)
                 spread(success, own, "success", 100, **look)
+            for ax in (ax for ax in (reward, success) if not ax.lines):
+                say(ax, "not measured yet")
             share(success)
             success.set(xlabel="steps (million)", xscale="log", ylabel="success (%)" if task == "hover" else "")
         axes[0, 0].set_ylabel("reward of an episode (1)")

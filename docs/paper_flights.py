@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 from paper_curves import DOCS, smaller
 
@@ -78,7 +79,7 @@ def flown(policy: str, criterion: str = "", pick: Callable[[Flights], int] | Non
     index = pick(flights)
     world = bodies(env.task.scene(memory), index, float(flights.time[flights.length[index] - 1]))
     one = only(flights, [index])
-    return Flown(one, [] if suite.own_worlds else scene(suite, one), world, env.cameras, drawn)
+    return Flown(one, [], world, env.cameras, drawn)
 
 
 def fastest(flights: Flights) -> int:
@@ -94,6 +95,10 @@ def space(fig: Any, known: Flown, room: Bbox, title: str, norm: Normalize) -> No
     low, high = bounds(tracks, known.things, known.world)
     draw_flights(ax, known.flights, known.things, low, high, norm)
     draw_space(ax, known.world)
+    ax.set(xlabel="", ylabel="", zlabel="")
+    for axis, few in ((ax.xaxis, 4), (ax.yaxis, 3), (ax.zaxis, 2)):
+        axis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
+        axis.set_tick_params(labelsize=7, pad=-2)
     fit_box(fig, ax, low, high, room)
     fig.text(room.x0 + 0.01, room.y1, title, size=11, va="bottom")
 
@@ -104,12 +109,12 @@ def panels(path: str, title: str, notes: list[str], shown: dict[str, Flown], row
     speeds = [x.flights.speed[:k, i].max() for x in shown.values() for i, k in enumerate(x.flights.length)]
     norm = Normalize(0.0, float(np.max(speeds)))
     with figure(DOCS / path, title, height, notes, free=True) as fig:
-        wide, top = 0.93 / columns, 1 - (0.62 + 0.21 * len(notes)) / height
+        wide, top = 0.92 / columns, 1 - (0.62 + 0.21 * len(notes)) / height
         high = top / rows
         for i, (name, known) in enumerate(shown.items()):
             x, y = wide * (i % columns), top - high * (i // columns + 1)
             space(fig, known, Bbox.from_bounds(x + 0.01, y + 0.01, wide - 0.02, high - 0.08), name, norm)
-        bar = fig.add_axes((0.945, 0.2, 0.012, 0.6))
+        bar = fig.add_axes((0.935, 0.2, 0.012, 0.6))
         fig.colorbar(ScalarMappable(norm, SPEED), cax=bar).set_label("speed (m/s)")
         bar.grid(False)
     smaller(DOCS / path)
@@ -122,7 +127,7 @@ def scenarios() -> None:
         "Visual landing": flown("land_visual", pick=fastest),
         "Racing with obstacles": flown("race_clutter", "s_shaped", pick=fastest),
     }  # fmt: skip
-    notes = [f"{EPISODES} flights from unseen starts; of a task by sight one, as each has its own world"]
+    notes = [f"{EPISODES} flights from unseen starts; of a task by sight one, as each has its own world; axes in m"]
     panels("paper_scenarios.png", "Training scenarios", notes, shown, 2, 7.2)
 
 
@@ -134,8 +139,8 @@ def racing() -> None:
         k = int(flights.length[0])
         told = f"{title}: {flights.speed[:k, 0].max():.1f} m/s at most, lap in {flights.time[k - 1]:.1f} s"
         shown[told] = shown.pop(title)
-    notes = [f"the fastest lap of {EPISODES} unseen worlds each"]
-    panels("paper_racing.png", "Racing with obstacles", notes, shown, 1, 4.2)
+    notes = [f"the fastest lap of {EPISODES} unseen worlds each; axes in m, the circle is the start"]
+    panels("paper_racing.png", "Racing with obstacles", notes, shown, 1, 3.6)
 
 
 def landing() -> None:

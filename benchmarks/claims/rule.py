@@ -185,11 +185,11 @@ def strength(case: Case) -> tuple[int, bool]:
 
 def missing(claim: Claim, against: Sequence[Case], found: Found) -> list[str]:
     """What the strongest of the cases of each name that contradict a claim lack to refute it."""
+    if claim.theirs_alone:
+        return [claim.theirs_alone]
     sides = [side for case in against for side in case.sides]
     fewest = min((side.seeds for side in sides), default=0)
-    lacking = [claim.theirs_alone] if claim.theirs_alone else []
-    if fewest < SEEDS:
-        lacking.append(f"only {fewest} {'seed' if fewest == 1 else 'seeds'} of {SEEDS}")
+    lacking = [f"only {fewest} {'seed' if fewest == 1 else 'seeds'} of {SEEDS}"] if fewest < SEEDS else []
     if short := [side for side in sides if not side.whole]:
         least = min(min(side.steps) / (side.claimed or 1.0) for side in short)
         lacking.append(f"only {100 * least:.2g} % of the paper's steps")

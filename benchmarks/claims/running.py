@@ -208,7 +208,6 @@ def figures(out: Path) -> dict[str, Any]:
         "reached": {x: moment(p) for x, p in reached.items()},
         "held": {str(x): moment(first_held(known, x)) for x in LEVELS},
         "converged": converged(known),
-        "return": float(np.mean([p["return"] for p in known[-max(1, len(known) // 10) :]])),
         "shipped": {name: told for name, told in summary["shipped"].items() if name != "update"},
         "curve": {name: numbers(p[name] for p in shown) for name in CURVE},
     }

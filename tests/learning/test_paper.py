@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from e2efly.commands.train import parse
 from tests.conftest import QUICK
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -167,7 +168,7 @@ def learned(algo: str, reached: float | None, seed: int = 0, **other: Any) -> di
     told: dict[str, Any] = {
         "task": "hover", "algo": algo, "variant": f"{PAPER}, {IDENTICAL}", "seed": seed, "finished": True,
         "steps": 1e8, "seconds": 1e3, "cpu_seconds": 1e3, "cores": 1, "reached": {"0.9": at},
-        "held": {"0.99": at}, "shipped": {"hover": {"success": 1.0}}, "return": -1.0,
+        "held": {"0.99": at}, "shipped": {"hover": {"success": 1.0}}, "curve": {"return": "-1"},
     }  # fmt: skip
     return told | other
 
@@ -190,10 +191,10 @@ def words(runs: list[dict[str, Any]]) -> list[str]:
 
 def test_verdicts_of_learning_follow_the_figures() -> None:
     assert words([]) == [UNMEASURED] * 6
-    bptt, ppo = learned("bptt", 1e6), learned("ppo", 5e6, **{"return": -2.0})
+    bptt, ppo = learned("bptt", 1e6), learned("ppo", 5e6, curve={"return": "-2"})
     assert words(every(bptt, ppo)) == [CONFIRMED] * 6
     assert words([one for one in every(bptt, ppo) if one["task"] == "hover"]) == [UNMEASURED] * 6
-    slower = learned("ppo", 2e6, **{"return": -0.5})
+    slower = learned("ppo", 2e6, curve={"return": "-0.5"})
     assert words(every(bptt, slower))[:3] == [CONFIRMED, DIFFERS, DIFFERS]  # one seed, nothing varied
     # one set of rewards with which a claim holds is enough for it
     assert words([*every(bptt, slower, variants=(OWN,)), *every(bptt, ppo, variants=(IDENTICAL,))])[1] == CONFIRMED
@@ -286,6 +287,14 @@ def test_the_variants_of_invented_numbers_are_runs() -> None:
         for claim in experiment.claims:
             for number in claim.invented or ():
                 assert set(number.variants) <= variants, (claim.says, number.what)
+
+
+def test_the_options_of_all_runs_are_accepted() -> None:
+    """Of trainings: a run begins only after hours of others."""
+    for experiment in EXPERIMENTS.values():
+        for run in (run for run in experiment.runs if run.kind == "train"):
+            asked = parse([run.task, "--algo", run.algo, "--out", "never", *run.options])
+            assert asked.config.task.name == run.task
 
 
 def test_an_ablation_counts_where_the_full_reward_learns() -> None:
