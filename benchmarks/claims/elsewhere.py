@@ -1,6 +1,5 @@
 """Figures of the paper that other benchmarks have measured already, and those that nothing here can measure."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ from claims.experiment import Experiment
 from claims.found import Found
 from claims.rule import Case, Claim
 from e2efly import vehicles
+from e2efly.alignment.parts import read_parts
 
 
 def aligned(found: Found) -> list[Case]:
@@ -144,15 +144,12 @@ PARTS = Path(vehicles.__file__).parent / "parts"
 
 
 def prices(found: Found) -> list[Case]:
-    """What the parts of our lists cost that fly, beside the paper's price."""
+    """What the parts that fly cost by our lists, without the battery as in the paper, beside the paper's price."""
     del found
     out = []
     for name, theirs in PRICES.items():
-        parts = tomllib.loads((PARTS / f"{name}.toml").read_text(encoding="utf-8"))["part"]
-        if any("price_usd" not in part for part in parts):
-            continue
-        cost = sum(part["price_usd"] * (len(part["place"]) if isinstance(part["place"][0], list) else 1)
-                   for part in parts)  # fmt: skip
+        parts = [part for part in read_parts(PARTS / f"{name}.toml") if not part.battery]
+        cost = sum(len(part.places) * (part.purchase.price or 0.0) for part in parts)
         near = abs(cost - theirs) <= DEARER * theirs
         out.append(Case(name.upper().replace("_", "-"), near, True, f"{cost:.0f} USD, theirs {theirs}"))
     return out
@@ -162,7 +159,7 @@ NEEDS = "needs the vehicle"
 FLIGHTS = "benchmarks.md#whole-flights-through-real-betaflight-firmware-nobody-helping"
 REAL = Experiment(
     "real",
-    "Policy response, and what else needs a vehicle",
+    "Policy response, and what else is about the vehicles",
     "figures *Policy response after step-response alignment*, *Zero-shot transfer from simulation to real world*; "
     "table of vehicle parameters",
     (

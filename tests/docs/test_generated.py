@@ -123,11 +123,9 @@ def test_the_curves_of_the_papers_figures_are_drawn_from_what_there_is(tmp_path:
         return {"task": task, "algo": algo, "variant": f"paper, {variant} rewards", "curve": curve}
 
     few = [run("hover", "ppo", "identical", "1e6 2e6 3e6", "0 0.5 1"), run("hover", "bptt", "identical", "1e6", "1")]
-    drawn = [curves.learning(few, "paper"), curves.visual([], few)]
     assert curves.learning(few, "authors") is None
-    for path in drawn:
-        with Image.open(path) as picture:
-            assert np.asarray(picture.convert("RGB")).std() > 5
+    with Image.open(curves.learning(few, "paper")) as picture:
+        assert np.asarray(picture.convert("RGB")).std() > 5
 
 
 @pytest.mark.parametrize("name", ["vis_r", "vis_h"])
