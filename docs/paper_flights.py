@@ -109,12 +109,12 @@ def panels(path: str, title: str, notes: list[str], shown: dict[str, Flown], row
     speeds = [x.flights.speed[:k, i].max() for x in shown.values() for i, k in enumerate(x.flights.length)]
     norm = Normalize(0.0, float(np.max(speeds)))
     with figure(DOCS / path, title, height, notes, free=True) as fig:
-        wide, top = 0.92 / columns, 1 - (0.62 + 0.21 * len(notes)) / height
+        wide, top = 0.91 / columns, 1 - (0.45 + 0.21 * len(notes)) / height
         high = top / rows
         for i, (name, known) in enumerate(shown.items()):
             x, y = wide * (i % columns), top - high * (i // columns + 1)
             space(fig, known, Bbox.from_bounds(x + 0.01, y + 0.01, wide - 0.02, high - 0.08), name, norm)
-        bar = fig.add_axes((0.935, 0.2, 0.012, 0.6))
+        bar = fig.add_axes((0.928, 0.2, 0.012, 0.6))
         fig.colorbar(ScalarMappable(norm, SPEED), cax=bar).set_label("speed (m/s)")
         bar.grid(False)
     smaller(DOCS / path)

@@ -32,8 +32,8 @@ AFTER = """The tables say how many seeds each row has. With few seeds, a row sho
 how often. *Confirmed* needs no number of seeds. VisFly, the paper's simulator, may give another result than ours.
 """
 COMMANDS = {
-    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo "
-    "--env.past-actions 0`: its rewards, sizes and observations",
+    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo`: its "
+    "rewards, sizes and observations; `--preset authors`: with the starts, limits and delay of its authors' public code",
     "Identical rewards for both": "`--reward.weights act3 0 goal 0 crash 0` removes the terms that only PPO has",
     "Reward ablation": "`e2efly ablate --by group`; with `--preset paper --past-actions 0` for the paper's rewards",
     "Visual landing by a segmentation mask, on three shapes of pad": "`e2efly train land_visual`",
@@ -50,7 +50,7 @@ TAIL = """## Where it differs
   with compilation.
 - Our starts are wider than those of the code around the paper. Our default preset, `robust`, trains for many vehicles
   and not for one. `--preset nominal` trains for the vehicle of the file alone. `--preset paper` trains with the
-  paper's weights, steps and sizes.
+  paper's weights, steps and sizes; where the paper is silent, with numbers of its authors' public code.
 - By default our policies see as many of their own past actions as fit into the latency. The paper's observations have
   no past actions: they have 13 numbers, in tracking 40, in racing 16. `--env.past-actions 0` gives the same. The
   experiments above that say *the paper's observations* use this option.

@@ -155,6 +155,7 @@ STEPS = 100_000_000
 """The paper's, of racing in clutter by PPO."""
 LEARNERS = {
     "paper": ("--preset", "paper", "--env.past-actions", "0"),
+    "authors": ("--preset", "authors", "--env.past-actions", "0"),
     "ours": ("--preset", "nominal", "--steps", str(STEPS)),
     "ours, fewer steps": ("--preset", "nominal"),
 }
@@ -190,7 +191,13 @@ CURRICULUM = Experiment(
                 Invented(
                     "rewards, network, size of a batch", "the preset `paper`", ("ours, curriculum", "ours, one step")
                 ),
-                Invented("density of obstacles, speeds, scale of the tracks", "ours"),
+                Invented(
+                    "number of obstacles, speeds, scale of the tracks",
+                    "ours",
+                    ("authors, curriculum", "authors, one step"),
+                    tasks=("race_clutter",),
+                ),
+                Invented("density of the forest, speeds", "ours", tasks=("avoid",)),
                 Invented("stages of the curriculum", "no obstacles, few, all"),
             ),
             "success on 1000 unseen starts, by the worst criterion; the same: 2 points more",
