@@ -137,9 +137,9 @@ def racing() -> None:
     for title in list(shown):
         flights = shown[title].flights
         k = int(flights.length[0])
-        told = f"{title}: {flights.speed[:k, 0].max():.1f} m/s at most, lap in {flights.time[k - 1]:.1f} s"
+        told = f"{title}: {flights.speed[:k, 0].max():.1f} m/s, {flights.time[k - 1]:.1f} s"
         shown[told] = shown.pop(title)
-    notes = [f"the fastest lap of {EPISODES} unseen worlds each; axes in m, the circle is the start"]
+    notes = [f"the fastest lap of {EPISODES} unseen worlds each, its top speed and its time; axes in m; circle: start"]
     panels("paper_racing.png", "Racing with obstacles", notes, shown, 1, 3.6)
 
 

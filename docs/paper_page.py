@@ -32,8 +32,8 @@ AFTER = """The tables say how many seeds each row has. With few seeds, a row sho
 how often. *Confirmed* needs no number of seeds. VisFly, the paper's simulator, may give another result than ours.
 """
 COMMANDS = {
-    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo`: its "
-    "rewards, sizes and observations; `--preset authors`: with the starts, limits and delay of its authors' public code",
+    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo`: "
+    "its rewards, sizes, observations; `--preset authors`: with the starts, limits and delay of its authors' code",
     "Identical rewards for both": "`--reward.weights act3 0 goal 0 crash 0` removes the terms that only PPO has",
     "Reward ablation": "`e2efly ablate --by group`; with `--preset paper --past-actions 0` for the paper's rewards",
     "Visual landing by a segmentation mask, on three shapes of pad": "`e2efly train land_visual`",
