@@ -70,7 +70,7 @@ def learning(runs: Sequence[Run], preset: str) -> Path | None:
             ):
                 own = [x for x in drawn if (x["task"], x["algo"]) == (task, algo) and f", {rewards} " in x["variant"]]
                 told = f"{algo.upper()}{', with the rewards of its own table' if style == ':' else ''}"
-                look = {"color": COLOURS[algo], "linestyle": style, "label": told}
+                look: Any = {"color": COLOURS[algo], "linestyle": style, "label": told}
                 if style == "-":
                     spread(reward, own, "return", **look)
                 spread(success, own, "success", 100, **look)
@@ -134,7 +134,7 @@ def visual(racing: Sequence[Run], landing: Sequence[Run]) -> Path | None:
             whole = all("return" in one["curve"] for one in runs)
             for variant in dict.fromkeys(one["variant"] for one in runs):
                 own = [one for one in runs if one["variant"] == variant]
-                look = {"color": colours[variant], "label": variant}
+                look: Any = {"color": colours[variant], "label": variant}
                 spread(reward, own, "return" if whole else "reward", **look)
                 spread(success, own, "success", 100, **look)
             reward.set(title=title, ylabel=f"reward of {'an episode' if whole else 'a step'} (1)")

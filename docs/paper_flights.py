@@ -25,7 +25,7 @@ from e2efly.environment import UNSEEN, random_key
 from e2efly.simulation.device import prepare
 from e2efly.simulation.physics.rotation import to_matrix
 from e2efly.simulation.scenes.faces import FacesBody, bodies
-from e2efly.validation.evaluation import SEED, act_of, candidate
+from e2efly.validation.evaluation import SEED, act_of, candidate, drawn_by
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.image_plots import show
 from e2efly.viewing.objects import scene
@@ -73,7 +73,7 @@ def flown(policy: str, criterion: str = "", pick: Callable[[Flights], int] | Non
     env, act, key = found.environment(suite), act_of(found.policy), random_key(SEED, UNSEEN, 0)
     flights = fly(env, act, key, EPISODES, env.episode_steps)
     memory = env.reset(key, EPISODES)[0].memory
-    drawn = {name: np.asarray(x) for name, x in env.task.drawn(memory).items()}
+    drawn = {name: np.asarray(x) for name, x in drawn_by(env.task, memory).items()}
     if pick is None:
         return Flown(flights, scene(suite, flights), [], env.cameras, drawn)
     index = pick(flights)

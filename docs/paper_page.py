@@ -16,7 +16,7 @@ DOCS = Path(__file__).parent
 BENCHMARKS = DOCS.parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
-from claims.learning import LEVEL, THEIRS  # noqa: E402
+from claims.learning import LEVEL, THEIRS, cost  # noqa: E402
 from claims.rule import RULE, UNMEASURED, UNTESTABLE, WORDS  # noqa: E402
 
 FILE = BENCHMARKS / "results" / "paper.json"
@@ -170,8 +170,8 @@ def folded(title: str, rows: list[dict[str, str]]) -> list[str]:
 def training(parts: dict[str, Any]) -> list[dict[str, str]]:
     """The paper's table of training: FPS, steps and seconds of PPO and BPTT in the four tasks, theirs and ours.
 
-    Ours are medians over the seeds: steps and seconds until 90 % of the starts succeed, by the preset `paper` or, where
-    it does not get there, by `authors`.
+    Ours are medians over the seeds: steps and CPU seconds until 90 % of the starts succeed, by the preset `paper` or,
+    where it does not get there, by `authors`.
     """
     out = []
     for algo in ("ppo", "bptt"):
@@ -183,22 +183,22 @@ def training(parts: dict[str, Any]) -> list[dict[str, str]]:
             rates = [one["rate"] for one in parts["speed"]["runs"] if (one["task"], one["algo"]) == (task, algo)]
             ours["FPS", task] = f"{statistics.median(rates) / 1e3:.0f} k" if rates else "-"
             reached = first_reached(parts["learning"]["runs"], task, algo)
-            ours["M steps", task] = f"{statistics.median(x['steps'] for x in reached) / 1e6:.2g}" if reached else "-"
-            ours["s", task] = f"{statistics.median(x['seconds'] for x in reached):.0f}" if reached else "-"
+            for kind, figure, scale in (("M steps", "steps", 1e6), ("s", "seconds", 1.0)):
+                values = [cost(one, figure) / scale for one in reached]
+                ours[kind, task] = f"{statistics.median(values):.2g}" if values else "-"
         for whose, row in (("theirs", theirs), ("ours", ours)):
             columns = {f"{kind}, {task}": row[kind, task] for kind in ("FPS", "M steps", "s") for task in TASKS}
             out.append({"": f"{algo.upper()}, {whose}", **columns})
     return out
 
 
-def first_reached(runs: list[dict[str, Any]], task: str, algo: str) -> list[dict[str, float]]:
-    """When the seeds of the first kind of run of which all get to 90 % were there."""
+def first_reached(runs: list[dict[str, Any]], task: str, algo: str) -> list[dict[str, Any]]:
+    """The seeds of the first kind of run of which all get to 90 %."""
     rewards = "identical rewards" if algo == "bptt" else "its own rewards"
     for preset in ("paper", "authors"):
         own = [x for x in runs if (x["task"], x["algo"], x["variant"]) == (task, algo, f"{preset}, {rewards}")]
-        reached = [one["reached"][LEVEL] for one in own]
-        if reached and all(reached):
-            return reached
+        if own and all(one["reached"][LEVEL] for one in own):
+            return own
     return []
 
 

@@ -215,7 +215,7 @@ def figures(out: Path) -> dict[str, Any]:
 
 def moment(point: Mapping[str, float] | None) -> dict[str, float] | None:
     """When an evaluation was."""
-    return point and {name: point[name] for name in ("steps", "seconds")}
+    return None if point is None else {name: point[name] for name in ("steps", "seconds")}
 
 
 def converged(points: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -109,7 +109,7 @@ RACERS = {
 """Whose preset: each trains one policy for all tracks, and one for each."""
 
 
-def laps(one: Any, name: str) -> dict[str, Any] | None:
+def laps(one: Any, name: str) -> Any:
     """The flights of a policy on a track; None: it flies others. A policy of one track has one criterion."""
     flown = one["flights"]["its tracks"] if one["algo"] == "zoo" else one["shipped"]
     alone = one["variant"].endswith(TRACKS[name])
