@@ -237,8 +237,8 @@ networks and observations: 13 numbers (track 40, race 16). The paper says that t
 give PPO an action term and sparse terms in addition. Both versions are measured. The preset `paper` has the paper's
 numbers, and those of its authors' public code where it gives none. The preset `authors` has what that code does beside:
 starts, limits, delay, what counts as success. Numbers that the paper does not give are varied one by one. A training
-may be stopped once its success has stayed at 99 %; its reward is then not compared. Seconds are CPU seconds of all cores,
-with compilation: other work of the machine does not count.""",
+may be stopped once its success has stayed at 99 %; its reward is then not compared. Seconds are CPU seconds of all
+cores, with compilation: other work of the machine does not count.""",
     seeds=3,
     short=2,
 )  # fmt: skip

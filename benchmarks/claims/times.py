@@ -72,8 +72,8 @@ SPEED = Experiment(
         for algo in ("bptt", "ppo")
     ),
     speed_rows,
-    "FPS are the median over the chunks of a run of 2 M steps, without the evaluations, while nothing else ran. Steps and "
-    "CPU seconds are those of the trainings above, until 90 % of 250 starts succeed, as medians of the seeds.",
+    "FPS are the median over the chunks of a run of 2 M steps, without the evaluations, while nothing else ran. Steps "
+    "and CPU seconds are those of the trainings above, until 90 % of 250 starts succeed, as medians of the seeds.",
     seeds=1,
 )
 
