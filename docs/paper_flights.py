@@ -139,7 +139,7 @@ def racing() -> None:
         k = int(flights.length[0])
         told = f"{title}: {flights.speed[:k, 0].max():.1f} m/s, {flights.time[k - 1]:.1f} s"
         shown[told] = shown.pop(title)
-    notes = [f"the fastest lap of {EPISODES} unseen worlds each, its top speed and its time; axes in m; circle: start"]
+    notes = [f"of {EPISODES} unseen worlds the lap with the highest speed; that speed, and its time; axes in m"]
     panels("paper_racing.png", "Racing with obstacles", notes, shown, 1, 3.6)
 
 
