@@ -1,14 +1,19 @@
 """The paper's experiments: every table and figure that needs no vehicle, ours beside theirs, with a verdict a claim.
 
     python benchmarks/paper.py EXPERIMENT... [--seeds N] [--tasks hover ...] [--algos bptt ...] [--variants TEXT ...]
-                               [--most STEPS] [--runs FOLDER] [--again] [--short] [--json FILE]
+                               [--most STEPS] [--stop SUCCESS] [--device cpu|gpu] [--runs FOLDER] [--again] [--short]
+                               [--add FILE ...] [--json FILE]
     python benchmarks/paper.py                # judges anew what is there already
 
 Each training is a process of `e2efly train`. What a run came to is written at once. A finished run is not repeated but
-with `--again`, and a training that was killed goes on from its checkpoint in --runs. `--most` stops a training in order
-once it has taken so many steps: it counts with those, and a later command with more of them goes on. `--short`
-makes the first run or two of each experiment in seconds, with sizes that teach nothing. Experiments, runs and rules of
-the verdicts: `benchmarks/claims`.
+with `--again`, and a training that was killed goes on from its checkpoint in --runs.
+
+`--most` stops a training in order once it has taken so many steps. `--stop` stops it once its success has stayed at a
+level for a few evaluations: that answers whether it learns and when, but not what its rewards come to after all its
+steps. A run that was stopped counts with the steps that it has, and a later command without the option goes on.
+
+`--short` makes the first run or two of each experiment in seconds, with sizes that teach nothing. Experiments, runs and
+rules of the verdicts: `benchmarks/claims`.
 """
 
 import argparse
@@ -19,8 +24,10 @@ from pathlib import Path
 from typing import Any
 
 from claims import EXPERIMENTS
-from claims.experiment import Experiment, Found, Run
-from claims.running import How, key, make, wanted
+from claims.experiment import Experiment, Run
+from claims.found import Found
+from claims.rule import judge
+from claims.running import HELD, LEVELS, How, key, make, wanted
 from common import RESULTS, machine, table, today
 
 from e2efly.config.storage import held, write_json
@@ -41,17 +48,35 @@ def read(path: Path) -> dict[str, Any]:
     return {name: {part: known.get(name, nothing)[part] for part in nothing} for name in EXPERIMENTS}
 
 
+def joined(known: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """All runs of two files; of a run that both have, that of the other file, and its machine and day."""
+    out = {}
+    for name, own in known.items():
+        anew = {key(one) for one in other[name]["runs"]}
+        kept = [one for one in own["runs"] if key(one) not in anew]
+        out[name] = {**(other[name] if anew else own), "runs": [*kept, *other[name]["runs"]]}
+    return out
+
+
 def judged(experiment: Experiment, runs: list[Any]) -> dict[str, Any]:
     """What an experiment is, and what its runs come to: its claims with verdicts, and its table."""
     found = Found(runs, results)
-    verdicts = [(claim, claim.judge(found)) for claim in experiment.claims]
+    verdicts = [(claim, judge(claim, found)) for claim in experiment.claims]
     return {
         "title": experiment.title,
         "where": experiment.where,
         "about": experiment.about.strip(),
         "made_of": {name: known["date"] for name in experiment.made_of if (known := results(name))},
         "claims": [
-            {"the paper": c.says, "theirs": c.theirs, "ours": v.ours, "verdict": v.word, "why": v.why}
+            {
+                "the paper": c.says,
+                "theirs": c.theirs,
+                "verdict": v.word,
+                "why": v.why,
+                "cases": v.cases,
+                "invented": v.invented,
+                **v.measured,
+            }
             for c, v in verdicts
         ],
         "table": experiment.rows(found),
@@ -76,7 +101,12 @@ def asked(experiment: Experiment, options: argparse.Namespace) -> list[tuple[Run
     ]
     runs = runs[: experiment.short] if options.short else runs
     seeds = range(1 if options.short else options.seeds or experiment.seeds)
-    return [(run, seed) for seed in seeds for run in runs if seed == 0 or run.kind == "train"]
+    return [(run, seed) for seed in seeds for run in runs if seed < most(run, len(seeds))]
+
+
+def most(run: Run, seeds: int) -> int:
+    """How many of the seeds a run has: a training each of them, if it has no limit of its own."""
+    return 1 if run.kind != "train" else seeds if run.seeds is None else min(seeds, run.seeds)
 
 
 def parsed() -> argparse.Namespace:
@@ -90,12 +120,17 @@ def parsed() -> argparse.Namespace:
     add("--variants", nargs="*", default=[], help="those alone whose names hold one of these texts")
     add("--most", type=float, default=math.inf, help="stop a training after so many environment steps")
     add(
+        "--stop", type=float, choices=LEVELS, help=f"stop a training once its success stays so high: {HELD} evaluations"
+    )
+    add("--device", choices=["cpu", "gpu"], default="cpu", help="where to train; left out: cpu")
+    add(
         "--runs",
         type=Path,
         help="folder of the trainings, which a later command takes or goes on with; left out: a temporary one",
     )
     add("--again", action="store_true", help="repeat what is there already")
     add("--short", action="store_true", help="a tiny run or two of each experiment")
+    add("--add", type=Path, nargs="*", default=[], help="files of other runs, which join those of --json")
     add("--json", type=Path, default=FILE, help=f"the figures; left out: {FILE.name} beside the others")
     options = parser.parse_args()
     for name in options.experiments:
@@ -108,15 +143,26 @@ def main() -> None:
     """Make what is asked for, judge, print the tables, write JSON."""
     options = parsed()
     with tempfile.TemporaryDirectory() as folder:
-        how = How(options.runs or Path(folder), short=options.short, most=options.most)
+        how = How(
+            options.runs or Path(folder),
+            short=options.short,
+            most=options.most,
+            stop=options.stop,
+            device=options.device,
+        )
         with held(how.folder):
             for name in options.experiments:
                 measure(EXPERIMENTS[name], options, how)
     known = read(options.json)
+    for file in options.add:
+        known = joined(known, read(file))
     write(options.json, known)
     for name in options.experiments or EXPERIMENTS:
         result = judged(EXPERIMENTS[name], known[name]["runs"])
-        print(f"\n{EXPERIMENTS[name].title}\n\n{table(result['claims'])}")
+        words = [
+            {part: claim[part] for part in ("the paper", "theirs", "verdict", "why")} for claim in result["claims"]
+        ]
+        print(f"\n{EXPERIMENTS[name].title}\n\n{table(words)}")
         if result["table"]:
             print(f"\n{table(result['table'])}")
 

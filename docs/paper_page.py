@@ -1,6 +1,11 @@
-"""Make docs/paper.md, "The paper's claims", and its pictures, from benchmarks/results/paper.json: `make docs`."""
+"""Make docs/paper.md, "The paper's claims", and its curves, from benchmarks/results/paper.json: `make docs`.
+
+The pictures of flights are drawn by docs/paper_flights.py.
+"""
 
 import json
+import statistics
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -8,27 +13,27 @@ from typing import Any
 from e2efly.commands.terminal import markdown
 
 DOCS = Path(__file__).parent
-FILE = DOCS.parent / "benchmarks" / "results" / "paper.json"
-WORDS = ("confirmed", "refuted", "not testable here", "not measured yet")
+BENCHMARKS = DOCS.parent / "benchmarks"
+sys.path.insert(0, str(BENCHMARKS))
+
+from claims.learning import LEVEL, THEIRS, cost  # noqa: E402
+from claims.rule import RULE, UNMEASURED, UNTESTABLE, WORDS  # noqa: E402
+
+FILE = BENCHMARKS / "results" / "paper.json"
 HEAD = """# The paper's claims
 
 e2efly implements *E2E-Fly: An Integrated Training-to-Deployment System for End-to-End Quadrotor Autonomy* by Fangyu
 Sun, Fanxing Li, Linzuo Zhang, Yu Hu, Renbiao Jin, Shuyu Wu, Wenxian Yu and Danping Zou (Shanghai Jiao Tong
 University). This page takes every table and figure of its experiments, puts our figures beside theirs, and says of each
-claim whether we find the same. It is written by `make docs` from what `benchmarks/paper.py` has measured. The rules of
-the verdicts are code, in `benchmarks/claims`.
-
-- **confirmed**: our measurement, in our simulator, says the same.
-- **refuted**: our measurement contradicts the claim, under the conditions given beside it. The paper's simulator,
-  VisFly, may give another result.
-- **not testable here**: a test needs a vehicle, or the paper does not say what is to be measured.
-- **not measured yet**: the experiment is defined, but its runs are missing.
-
-The tables say how many seeds each row has. With few seeds, a row shows that something can happen, but not how often.
+claim whether we find the same. It is written by `make docs` from what `benchmarks/paper.py` has measured. The rule of
+the verdicts is code: `benchmarks/claims/rule.py`.
+"""
+AFTER = """The tables say how many seeds each row has. With few seeds, a row shows that something can happen, but not
+how often. *Confirmed* needs no number of seeds. VisFly, the paper's simulator, may give another result than ours.
 """
 COMMANDS = {
-    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo "
-    "--env.past-actions 0`: its rewards, sizes and observations",
+    "Training by PPO and BPTT: hovering, landing, tracking, racing": "`e2efly train race --preset paper --algo ppo`: "
+    "its rewards, sizes, observations; `--preset authors`: with the starts, limits and delay of its authors' code",
     "Identical rewards for both": "`--reward.weights act3 0 goal 0 crash 0` removes the terms that only PPO has",
     "Reward ablation": "`e2efly ablate --by group`; with `--preset paper --past-actions 0` for the paper's rewards",
     "Visual landing by a segmentation mask, on three shapes of pad": "`e2efly train land_visual`",
@@ -45,7 +50,7 @@ TAIL = """## Where it differs
   with compilation.
 - Our starts are wider than those of the code around the paper. Our default preset, `robust`, trains for many vehicles
   and not for one. `--preset nominal` trains for the vehicle of the file alone. `--preset paper` trains with the
-  paper's weights, steps and sizes.
+  paper's weights, steps and sizes; where the paper is silent, with numbers of its authors' public code.
 - By default our policies see as many of their own past actions as fit into the latency. The paper's observations have
   no past actions: they have 13 numbers, in tracking 40, in racing 16. `--env.past-actions 0` gives the same. The
   experiments above that say *the paper's observations* use this option.
@@ -65,53 +70,143 @@ virtual world.
     }
 """
 PICTURES = {
-    "learning": ("paper_learning.png", "rewards and success of PPO and BPTT against steps"),
-    "ablation": ("paper_ablation.png", "rewards without one of their parts against steps"),
+    "learning": (
+        ("paper_learning_paper.png", "rewards and success of PPO and BPTT against steps, preset paper"),
+        ("paper_learning_authors.png", "the same, preset authors"),
+    ),
+    "ablation": (
+        ("paper_ablation_ppo.png", "different reward settings, training via PPO"),
+        ("paper_ablation_bptt.png", "different reward settings, training via BPTT"),
+    ),
+    "landing": (
+        ("paper_landing.png", "poses of one policy on its way to a triangle, a disc and a square, with what it saw"),
+        ("paper_visual.png", "rewards and success of visual tasks against steps"),
+    ),
+    "racing": (("paper_racing.png", "laps on three tracks with obstacles, coloured by speed"),),
+    "step_response": (("step_response.png", "steps through real Betaflight firmware, and the simulator"),),
+    "real": (
+        ("paper_response.png", "commands and body rates of a policy in the simulator and through the real firmware"),
+        ("paper_scenarios.png", "flights of six tasks"),
+    ),
 }
-"""The curves of an experiment, once there are any."""
+"""The counterparts of the paper's figures, by experiment. One that is not drawn yet is left out."""
 TASKS = ("hover", "land", "track", "race")
-"""In the order of the paper."""
-LINES = {"identical rewards": "-", "its own rewards": "--"}
+"""In the order of the paper's table."""
 
 
 def page() -> str:
     """The page."""
     parts = json.loads(FILE.read_text(encoding="utf-8"))
-    counts, total = [], Counter()
-    for part in parts.values():
-        of = Counter(claim["verdict"] for claim in part["claims"])
-        total += of
-        anchor = part["title"].lower().replace(" ", "-").replace(",", "")
-        counts.append(
-            {
-                "experiment": f"[{part['title']}](#{anchor})",
-                **{word: str(of[word]) if of[word] else "" for word in WORDS},
-            }
-        )
-    counts.append({"experiment": "all", **{word: str(total[word]) for word in WORDS}})
-    lines = [HEAD, *markdown(counts), ""]
+    total = Counter(claim["verdict"] for part in parts.values() for claim in part["claims"])
+    words = [f"- **{word}** ({total[word]}): {told}" for word, told in WORDS.items()]
+    lines = [HEAD, *words, "", RULE, "", AFTER, *markdown(overview(parts)), ""]
     for name, part in parts.items():
-        lines += [*section(name, part), ""]
+        lines += [*section(name, part, parts), ""]
     commands = [{"the paper's experiment": what, "ours": how} for what, how in COMMANDS.items()]
     return "\n".join([*lines, "## Which command repeats it", "", *markdown(commands), "", TAIL])
 
 
-def section(name: str, part: dict[str, Any]) -> list[str]:
-    """An experiment: what it is, its claims, its curves and its table."""
+def overview(parts: dict[str, Any]) -> list[dict[str, str]]:
+    """All claims with their verdicts."""
+    return [
+        {
+            "claim": f"[{claim['the paper']}](#{anchor(part['title'])})",
+            "verdict": claim["verdict"],
+            **{name: claim.get(name, "-") for name in ("seeds", "M steps", "M steps, theirs")},
+            "numbers varied": varied(claim["invented"]),
+        }
+        for part in parts.values()
+        for claim in part["claims"]
+    ]
+
+
+def varied(invented: list[dict[str, str]]) -> str:
+    """How many of the numbers that the paper does not give have been varied."""
+    done = sum(number["varied"] != "no" and not number["varied"].startswith("not yet") for number in invented)
+    return f"{done} of {len(invented)}" if invented else "-"
+
+
+def anchor(title: str) -> str:
+    """The address of a heading on the page."""
+    return title.lower().replace(" ", "-").replace(",", "")
+
+
+def section(name: str, part: dict[str, Any], parts: dict[str, Any]) -> list[str]:
+    """An experiment: its claims, the counterparts of the paper's figures, its table, its cases, what was invented."""
     lines = [f"## {part['title']}", "", f"The paper: {part['where']}. {measured(name, part)}".strip(), ""]
     lines += [part["about"], ""] if part["about"] else []
-    lines += [*markdown(part["claims"]), ""]
-    if part["runs"] and name in PICTURES:
-        file, told = PICTURES[name]
-        lines += [f"![{told}]({file})", ""]
-    return [*lines, *(markdown(part["table"]) if part["table"] else [])]
+    words = ("the paper", "theirs", "verdict", "why")
+    claims = [{"": str(i), **{of: claim[of] for of in words}} for i, claim in enumerate(part["claims"], 1)]
+    lines += [*markdown(claims), ""]
+    for file, told in PICTURES.get(name, ()):
+        lines += [f"![{told}]({file})", ""] if (DOCS / file).exists() else []
+    lines += [*markdown(training(parts)), ""] if name == "speed" else []
+    if part["table"] and name != "speed":
+        lines += [*rows_measured(part["table"]), ""]
+    cases = [{"claim": str(i), **case} for i, c in enumerate(part["claims"], 1) for case in c["cases"]]
+    lines += folded("What each claim was judged by", without_empty(cases)) if cases else []
+    numbers = list({tuple(x.items()): x for claim in part["claims"] for x in claim["invented"]}.values())
+    lines += ["Numbers that the paper does not give:", "", *markdown(numbers), ""] if numbers else []
+    return lines[:-1]
+
+
+def rows_measured(table: list[dict[str, str]]) -> list[str]:
+    """A table without the rows that nobody has measured, and how many those are."""
+    rows = [row for row in table if UNMEASURED not in row.values()]
+    missing = f"Not measured yet: {len(table) - len(rows)} rows of {len(table)}." if len(rows) < len(table) else ""
+    return [*(markdown(rows) if rows else []), *(["", missing] if rows and missing else [missing] if missing else [])]
+
+
+def without_empty(rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Rows without the columns in which none has anything."""
+    return [{name: x for name, x in row.items() if any(other[name] not in ("", "-") for other in rows)} for row in rows]
+
+
+def folded(title: str, rows: list[dict[str, str]]) -> list[str]:
+    """A table that opens when it is asked for."""
+    return [f'<details markdown="1"><summary>{title}</summary>', "", *markdown(rows), "", "</details>", ""]
+
+
+def training(parts: dict[str, Any]) -> list[dict[str, str]]:
+    """The paper's table of training: FPS, steps and seconds of PPO and BPTT in the four tasks, theirs and ours.
+
+    Ours are medians over the seeds: steps and CPU seconds until 90 % of the starts succeed, by the preset `paper` or,
+    where it does not get there, by `authors`.
+    """
+    out = []
+    for algo in ("ppo", "bptt"):
+        theirs = {("FPS", t): f"{x / 1e3:.0f} k" for t, x in zip(TASKS, THEIRS["rate"][algo], strict=True)}
+        theirs |= {("M steps", t): f"{x / 1e6:.0f}" for t, x in zip(TASKS, THEIRS["steps"][algo], strict=True)}
+        theirs |= {("s", t): f"{x}" for t, x in zip(TASKS, THEIRS["seconds"][algo], strict=True)}
+        ours = {}
+        for task in TASKS:
+            rates = [one["rate"] for one in parts["speed"]["runs"] if (one["task"], one["algo"]) == (task, algo)]
+            ours["FPS", task] = f"{statistics.median(rates) / 1e3:.0f} k" if rates else "-"
+            reached = first_reached(parts["learning"]["runs"], task, algo)
+            for kind, figure, scale in (("M steps", "steps", 1e6), ("s", "seconds", 1.0)):
+                values = [cost(one, figure) / scale for one in reached]
+                ours[kind, task] = f"{statistics.median(values):.2g}" if values else "-"
+        for whose, row in (("theirs", theirs), ("ours", ours)):
+            columns = {f"{kind}, {task}": row[kind, task] for kind in ("FPS", "M steps", "s") for task in TASKS}
+            out.append({"": f"{algo.upper()}, {whose}", **columns})
+    return out
+
+
+def first_reached(runs: list[dict[str, Any]], task: str, algo: str) -> list[dict[str, Any]]:
+    """The seeds of the first kind of run of which all get to 90 %."""
+    rewards = "identical rewards" if algo == "bptt" else "its own rewards"
+    for preset in ("paper", "authors"):
+        own = [x for x in runs if (x["task"], x["algo"], x["variant"]) == (task, algo, f"{preset}, {rewards}")]
+        if own and all(one["reached"][LEVEL] for one in own):
+            return own
+    return []
 
 
 def measured(name: str, part: dict[str, Any]) -> str:
     """Where the figures come from."""
     if part["made_of"]:
         return f"From {', '.join(f'`{file}.json` of {day}' for file, day in part['made_of'].items())}."
-    if all(claim["verdict"] == WORDS[2] for claim in part["claims"]):
+    if all(claim["verdict"] == UNTESTABLE or not claim["cases"] for claim in part["claims"]) and not part["runs"]:
         return ""
     if not part["runs"]:
         return f"`benchmarks/paper.py {name}`."
@@ -121,97 +216,12 @@ def measured(name: str, part: dict[str, Any]) -> str:
     return f"`benchmarks/paper.py {name}`, {part['date']}, {of} cores of {m['cpu']}, JAX {m['jax']}."
 
 
-def numbers(line: str) -> list[float]:
-    """A column of a curve, which the file has in one line."""
-    return [float(x) for x in line.split()]
-
-
-def curve(one: dict[str, Any], name: str) -> list[float]:
-    """A column of a run's curve."""
-    return numbers(one["curve"][name])
-
-
-def learning(runs: list[dict[str, Any]]) -> None:
-    """docs/paper_learning.png: reward and success of every run against steps, one column per task."""
-    from e2efly.viewing.style import CYCLE, figure
-
-    tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
-    notes = ["one line per run; the preset paper; dashed: PPO with the action and sparse terms of its own table"]
-    with figure(DOCS / PICTURES["learning"][0], "PPO against BPTT", 5.6, notes) as fig:
-        axes = fig.subplots(2, len(tasks), squeeze=False, sharex=True)
-        for column, task in zip(axes.T, tasks, strict=True):
-            for one in (one for one in runs if one["task"] == task):
-                kind = {"color": CYCLE[one["algo"] == "ppo"], "linestyle": LINES[one["variant"]], "linewidth": 1.2}
-                steps = [x / 1e6 for x in curve(one, "steps")]
-                if one["variant"] != "its own rewards":  # another sum, which cannot be compared
-                    column[0].plot(steps, curve(one, "reward"), **kind)
-                label = f"{one['algo'].upper()}, {one['variant']}" if one["seed"] == 0 else None
-                column[1].plot(steps, [100 * x for x in curve(one, "success")], label=label, **kind)
-            column[0].set_title(task)
-            column[1].set_xscale("log")
-            column[1].set_ylim(-4, 104)
-            column[1].set_xlabel("steps (million)")
-        axes[0, 0].set_ylabel("reward of a step (1)")
-        axes[1, 0].set_ylabel("success (%)")
-        known = {label: line for ax in axes[1] for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-        fig.legend(list(known.values()), list(known), loc="outside lower center", ncols=3)
-
-
-def ablation(runs: list[dict[str, Any]]) -> None:
-    """docs/paper_ablation.png: the full reward and each without one part, one panel per task, algorithm and preset."""
-    from e2efly.config.drawing import INK
-    from e2efly.viewing.style import CYCLE, figure
-
-    tasks = [task for task in TASKS if any(one["task"] == task for one in runs)]
-    kinds = sorted({(one["variant"], one["algo"]) for one in runs})
-    notes = ["mean of the seeds; error of hover and track, success of land and race; black: the full reward"]
-    title, height = "Rewards without one of their parts", 1.0 + 2.6 * len(kinds)
-    with figure(DOCS / PICTURES["ablation"][0], title, height, notes) as fig:
-        axes = fig.subplots(len(kinds), len(tasks), squeeze=False)
-        parts = list(dict.fromkeys(name for one in runs for name in one["variants"][1:]))
-        for ax in axes.ravel():
-            ax.set_axis_off()
-        for one in runs:
-            ax = axes[kinds.index((one["variant"], one["algo"])), tasks.index(one["task"])]
-            ax.set_axis_on()
-            by_error = one["task"] in ("hover", "track")
-            steps = [x / 1e6 for x in numbers(one["curve"]["steps"])]
-            for variant, told in zip(one["variants"], one["curve"]["error" if by_error else "success"], strict=True):
-                full = variant == "full"
-                ax.plot(
-                    steps,
-                    [x * (1 if by_error else 100) for x in numbers(told)],
-                    color=INK if full else CYCLE[parts.index(variant) % len(CYCLE)],
-                    linewidth=2.2 if full else 1.4,
-                    label=variant if full else f"w/o {variant}",
-                )
-            ax.set_title(f"{one['task']} by {one['algo'].upper()}, {one['variant']}", fontsize=9)
-            ax.set_ylabel("error (m)" if by_error else "success (%)")
-            if by_error:
-                ax.set_yscale("log")
-            else:
-                ax.set_ylim(-4, 104)
-        known = {
-            label: line for ax in axes.ravel() for line, label in zip(*ax.get_legend_handles_labels(), strict=True)
-        }
-        fig.legend(list(known.values()), list(known), loc="outside lower center", ncols=7)
-        for ax in axes[-1]:
-            ax.set_xlabel("steps (million)")
-
-
 def main() -> None:
-    """Write the page, and draw what there is to draw."""
-    from PIL import Image
+    """Draw what there is to draw, and write the page."""
+    from paper_curves import draw
 
+    draw(json.loads(FILE.read_text(encoding="utf-8")))
     (DOCS / "paper.md").write_text(page(), encoding="utf-8")
-    parts = json.loads(FILE.read_text(encoding="utf-8"))
-    for name, draw in (("learning", learning), ("ablation", ablation)):
-        if parts[name]["runs"]:
-            draw(parts[name]["runs"])
-            path = DOCS / PICTURES[name][0]
-            with Image.open(path) as picture:
-                small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-            small.save(path, optimize=True)
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ from claims.vision import LANDING, RACING
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
     for experiment in (
-        LEARNING, SPEED, HOURS, ABLATION, LATENCY, RANDOMISATION, IDENTIFICATION, NOISE, CURRICULUM, LANDING, RACING,
-        STEPS, SIM_TO_SIM, RENDERING, REAL,
+        LEARNING, SPEED, HOURS, ABLATION, LANDING, RACING, STEPS, REAL, LATENCY, RANDOMISATION, IDENTIFICATION, NOISE,
+        CURRICULUM, SIM_TO_SIM, RENDERING,
     )
 }  # fmt: skip
 """By name, in the order of the page."""

@@ -21,6 +21,12 @@ from claims.experiment import Flight, Run
 
 LEVELS = (0.5, 0.9, 0.95, 0.99)
 """Success, over the starts that training watches, at which steps and seconds are noted."""
+EVALUATED = ("success", "final_error", "reward")
+"""What the evaluations of a training say of each criterion."""
+CURVE = ("steps", "seconds", "reward", "return", "success", "error")
+"""The columns of a curve."""
+HELD = 5
+"""Evaluations in a row over which success must stay at a level, for the level to be held."""
 STOPPED = 130
 """Exit status of a training that Ctrl-C has stopped in order."""
 POINTS = 40
@@ -60,14 +66,18 @@ class How:
     """Whether in seconds, with figures that say nothing."""
     most: float = math.inf
     """Environment steps after which a training is stopped in order; a later command goes on with it."""
+    stop: float | None = None
+    """Success, held over `HELD` evaluations, at which a training is stopped in order. None: it takes all its steps."""
+    device: str = "cpu"
+    """Where to train."""
 
 
 def wanted(run: Run, seed: int, seeds: int, known: Sequence[Mapping[str, Any]], how: How) -> bool:
     """Whether a run is to be made: it is not known, or was stopped earlier than it would be now."""
     for one in known:
         if key(one) == (run.task, run.algo, run.variant, seed):
-            enough = one["finished"] or one["steps"] >= how.most
-            return not enough or (run.kind == "ablate" and one["seeds"] != seeds)
+            over = one["finished"] or one["steps"] >= how.most or one["held"].get(str(how.stop))
+            return not over or (run.kind == "ablate" and one["seeds"] != seeds)
     return True
 
 
@@ -99,16 +109,27 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
     """The figures of a training, which goes on where its folder has one that was stopped or killed."""
     summary = out / "summary.json"
     told = json.loads(summary.read_text()) if summary.exists() else {"finished": False, "env_steps": 0}
-    if not told["finished"] and told["env_steps"] < how.most:
+    if not told["finished"] and not enough(points(out), how):
         if (out / "checkpoint.safetensors").exists():
             options = ["--resume", str(out)]
         else:
             short = (*SHORT, *SMALL[run.algo]) if how.short else ()
             options = [run.task, "--algo", run.algo, "--seed", str(seed), "--out", str(out), *run.options, *short]
-        limited = not math.isinf(how.most)
-        command = ["train", *options, "--no-plots", "--device", "cpu"]
-        process(command, out.with_suffix(".time"), lambda: limited and taken(out) >= how.most)
+        limited = not math.isinf(how.most) or how.stop is not None
+        command = ["train", *options, "--no-plots", "--device", how.device]
+        process(command, out.with_suffix(".time"), lambda: limited and enough(points(out), how))
     return figures(out)
+
+
+def enough(known: Sequence[Mapping[str, float]], how: How) -> bool:
+    """Whether a training may be stopped after these evaluations."""
+    return bool(known) and (known[-1]["steps"] >= how.most or first_held(known, how.stop) is not None)
+
+
+def first_held(known: Sequence[Mapping[str, float]], level: float | None) -> Mapping[str, float] | None:
+    """The first of `HELD` evaluations of the task itself in a row with at least this success. None: there are none."""
+    good = [level is not None and p["final"] and p["success"] >= level for p in known]
+    return next((known[i] for i in range(len(good) - HELD + 1) if all(good[i : i + HELD])), None)
 
 
 def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda: False) -> None:
@@ -144,46 +165,57 @@ def process(arguments: list[str], times: Path, over: Callable[[], bool] = lambda
     log.unlink()
 
 
-def taken(out: Path) -> float:
-    """Environment steps that a training has taken so far."""
+def points(out: Path) -> list[dict[str, Any]]:
+    """The evaluations of a training so far: steps, seconds, success and error of the worst criterion, the mean rewards
+    of a step and of an episode, and whether the task itself was flown or an earlier stage of the curriculum.
+    """
     from e2efly.runs.rundir import RunDirectory
 
-    rows = RunDirectory(out).rows()
-    return rows[-1]["steps"] if rows else 0.0
+    run = RunDirectory(out)
+    rows = run.rows()
+    stages = len(run.read_json("config.json")["curriculum"]) + 1 if rows else 1
+    last = [i for i, row in enumerate(rows) if "seconds" in row]
+    found = []
+    for before, i in zip([-1, *last], last, strict=False):
+        row = rows[i]
+        flown = {part: [x for name, x in row.items() if name.endswith(f"/{part}")] for part in EVALUATED}
+        found.append({
+            "steps": row["steps"], "seconds": row["seconds"], "rate": row["rate"],
+            "reward": float(np.mean([r["reward"] for r in rows[before + 1 : i + 1]])),
+            "success": min(flown["success"]), "error": max(flown["final_error"]),
+            "return": float(np.mean(flown["reward"])), "final": row.get("stage", stages) == stages,
+        })  # fmt: skip
+    return found
 
 
 def figures(out: Path) -> dict[str, Any]:
     """What a run directory says: steps, seconds, curves, when levels were reached, how the best policy flew."""
     from e2efly.runs.rundir import RunDirectory
 
-    run = RunDirectory(out)
-    summary, rows = run.read_json("summary.json"), run.rows()
+    summary, known = RunDirectory(out).read_json("summary.json"), points(out)
     times = out.with_suffix(".time")
     cpu = sum(map(float, times.read_text().split())) if times.exists() else math.nan
-    last = [i for i, row in enumerate(rows) if "seconds" in row]
-    points = []
-    for before, i in zip([-1, *last], last, strict=False):
-        row, success = rows[i], [x for name, x in rows[i].items() if name.endswith("/success")]
-        error = max(x for name, x in row.items() if name.endswith("/final_error"))
-        reward = float(np.mean([r["reward"] for r in rows[before + 1 : i + 1]]))
-        points.append({
-            "steps": row["steps"], "seconds": row["seconds"], "reward": reward, "success": min(success), "error": error,
-        })  # fmt: skip
-    every = math.ceil(len(points) / POINTS)
-    shown = points[::-1][::every][::-1]
-    reached = {str(x): next((p for p in points if p["success"] >= x), None) for x in LEVELS}
+    shown = known[::-1][:: math.ceil(len(known) / POINTS)][::-1]
+    task = [p for p in known if p["final"]]
+    reached = {str(x): next((p for p in task if p["success"] >= x), None) for x in LEVELS}
     return {
         "finished": bool(summary["finished"]),
         "steps": summary["env_steps"],
         "seconds": summary["seconds_trained_from_process_start"],
         "cpu_seconds": None if math.isnan(cpu) else cpu,
-        "rate": float(np.median([rows[i]["rate"] for i in last])),
+        "rate": float(np.median([p["rate"] for p in known])),
         "cores": len(os.sched_getaffinity(0)),
-        "reached": {x: p and {name: p[name] for name in ("steps", "seconds")} for x, p in reached.items()},
-        "converged": converged(points),
+        "reached": {x: moment(p) for x, p in reached.items()},
+        "held": {str(x): moment(first_held(known, x)) for x in LEVELS},
+        "converged": converged(known),
         "shipped": {name: told for name, told in summary["shipped"].items() if name != "update"},
-        "curve": {name: numbers(p[name] for p in shown) for name in shown[0]},
+        "curve": {name: numbers(p[name] for p in shown) for name in CURVE},
     }
+
+
+def moment(point: Mapping[str, float] | None) -> dict[str, float] | None:
+    """When an evaluation was."""
+    return None if point is None else {name: point[name] for name in ("steps", "seconds")}
 
 
 def converged(points: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,6 +109,23 @@ def test_a_configuration_is_everything_that_defines_a_training_but_its_seed_and_
 
 def test_the_page_of_the_papers_claims_is_what_was_measured() -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == script("paper_page").page()
+
+
+def test_the_curves_of_the_papers_figures_are_drawn_from_what_there_is(tmp_path: Path) -> None:
+    curves = script("paper_curves")
+    curves.DOCS = tmp_path
+    assert curves.learning([], "paper") is None
+    assert curves.ablation([], "ppo") is None
+    assert curves.visual([], []) is None
+
+    def run(task: str, algo: str, variant: str, steps: str, success: str) -> dict[str, Any]:
+        curve = {"steps": steps, "return": success, "success": success}
+        return {"task": task, "algo": algo, "variant": f"paper, {variant} rewards", "curve": curve}
+
+    few = [run("hover", "ppo", "identical", "1e6 2e6 3e6", "0 0.5 1"), run("hover", "bptt", "identical", "1e6", "1")]
+    assert curves.learning(few, "authors") is None
+    with Image.open(curves.learning(few, "paper")) as picture:
+        assert np.asarray(picture.convert("RGB")).std() > 5
 
 
 @pytest.mark.parametrize("name", ["vis_r", "vis_h"])

@@ -1,5 +1,6 @@
 """The paper's experiments, in their short versions: what they write, what they do not repeat, what they make of it."""
 
+import dataclasses
 import json
 import math
 import os
@@ -7,11 +8,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from e2efly.commands.train import parse
 from tests.conftest import QUICK
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -19,21 +22,40 @@ sys.path.insert(0, str(BENCHMARKS))
 
 import paper  # noqa: E402
 from claims import EXPERIMENTS  # noqa: E402
-from claims.ablations import missed, without  # noqa: E402
+from claims.ablations import ABLATION, THEIRS, missed  # noqa: E402
+from claims.ablations import AUTHORS as THEIR_AUTHORS  # noqa: E402
 from claims.alignment import NOMINAL  # noqa: E402
-from claims.experiment import (  # noqa: E402
+from claims.experiment import Run  # noqa: E402
+from claims.found import Found  # noqa: E402
+from claims.learning import AUTHORS, IDENTICAL, LEARNING, OWN, PAPER, TASKS, VARIED  # noqa: E402
+from claims.rule import (  # noqa: E402
     CONFIRMED,
-    NOTHING,
+    DIFFERS,
     REFUTED,
     UNMEASURED,
     UNTESTABLE,
-    Found,
-    Run,
+    WORDS,
+    Case,
+    Claim,
+    Invented,
+    Side,
     Verdict,
+    judge,
 )
-from claims.learning import LEARNING, OWN, TASKS  # noqa: E402
-from claims.running import SHORT, SMALL, How, converged, figures, process, trained, wanted  # noqa: E402
+from claims.running import (  # noqa: E402
+    SHORT,
+    SMALL,
+    How,
+    converged,
+    enough,
+    figures,
+    first_held,
+    process,
+    trained,
+    wanted,
+)
 
+SPARSE = ABLATION.claims[2]
 WITH_RUNS = [name for name, experiment in EXPERIMENTS.items() if experiment.runs]
 
 
@@ -71,7 +93,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
     assert len(part["runs"]) == EXPERIMENTS[name].short
     assert part["machine"]["cores"] and part["date"]
     assert all(one["finished"] for one in part["runs"])
-    assert all(claim["verdict"] in (CONFIRMED, REFUTED, UNTESTABLE, UNMEASURED) for claim in part["claims"])
+    assert all(claim["verdict"] in WORDS for claim in part["claims"])
     assert len(part["table"]) > 1
     assert any(UNMEASURED in str(row) or "-" in row.values() for row in part["table"])  # the runs left out
     for one in part["runs"]:
@@ -141,62 +163,182 @@ def test_a_reward_has_converged_where_it_stays() -> None:
     assert converged(points[:1])["steps"] == 0.0
 
 
-def learned(algo: str, reached: float | None, **other: Any) -> dict[str, Any]:
+def learned(algo: str, reached: float | None, seed: int = 0, **other: Any) -> dict[str, Any]:
     at = None if reached is None else {"steps": reached, "seconds": reached / 1e4}
     told: dict[str, Any] = {
-        "task": "hover", "algo": algo, "variant": "identical rewards", "seed": 0, "finished": True, "steps": 1e7,
-        "seconds": 1e3, "cpu_seconds": 1e3, "cores": 1, "reached": {"0.9": at},
-        "shipped": {"hover": {"success": 1.0}}, "converged": {"reward": -1.0},
+        "task": "hover", "algo": algo, "variant": f"{PAPER}, {IDENTICAL}", "seed": seed, "finished": True,
+        "steps": 1e8, "seconds": 1e3, "cpu_seconds": 1e3, "cores": 1, "reached": {"0.9": at},
+        "held": {"0.99": at}, "shipped": {"hover": {"success": 1.0}}, "curve": {"return": "-1"},
     }  # fmt: skip
     return told | other
 
 
-def verdicts(bptt: dict[str, Any], *ppo: dict[str, Any]) -> list[str]:
-    """The verdicts where all tasks have the same runs, PPO with either reward."""
-    runs = [one | {"task": task} for task in TASKS for one in (bptt, *ppo)]
-    runs += [one | {"task": task, "variant": OWN} for task in TASKS for one in ppo]
-    return words(runs)
+def seeds(one: dict[str, Any], count: int = 3) -> list[dict[str, Any]]:
+    return [one | {"seed": seed} for seed in range(count)]
+
+
+def every(*runs: dict[str, Any], variants: tuple[str, ...] = (IDENTICAL, OWN)) -> list[dict[str, Any]]:
+    """The same runs in all tasks, with both presets and these rewards."""
+    return [
+        one | {"task": task, "variant": f"{preset}, {variant}"}
+        for task in TASKS for preset in (PAPER, AUTHORS) for variant in variants for one in runs
+    ]  # fmt: skip
 
 
 def words(runs: list[dict[str, Any]]) -> list[str]:
-    return [claim.judge(Found(runs, lambda name: None)).word for claim in LEARNING.claims]
+    return [judge(claim, Found(runs)).word for claim in LEARNING.claims]
 
 
 def test_verdicts_of_learning_follow_the_figures() -> None:
-    assert words([]) == [NOTHING.word] * 6
-    bptt, ppo = learned("bptt", 1e6), learned("ppo", 5e6, converged={"reward": -2.0})
-    assert verdicts(bptt, ppo) == [CONFIRMED] * 6
-    assert words([bptt, ppo]) == [UNMEASURED] * 6  # hover alone
-    slower = learned("ppo", 2e6, converged={"reward": -0.5})
-    assert verdicts(bptt, slower)[:3] == [CONFIRMED, REFUTED, REFUTED]
-    assert words([bptt, slower])[:3] == [UNMEASURED, REFUTED, REFUTED]  # one case is enough to refute
-    # PPO that never got there took at least what its run took
-    assert verdicts(bptt, learned("ppo", None))[:2] == [CONFIRMED, CONFIRMED]
-    stopped = learned("ppo", None, finished=False, steps=5e5, seconds=50.0, cpu_seconds=50.0)
-    assert verdicts(bptt, stopped)[:3] == [UNMEASURED, UNMEASURED, UNMEASURED]
-    assert verdicts(learned("bptt", None), stopped)[:2] == [REFUTED, REFUTED]
+    assert words([]) == [UNMEASURED] * 6
+    bptt, ppo = learned("bptt", 1e6), learned("ppo", 5e6, curve={"return": "-2"})
+    assert words(every(bptt, ppo)) == [CONFIRMED] * 6
+    assert words([one for one in every(bptt, ppo) if one["task"] == "hover"]) == [UNMEASURED] * 6
+    slower = learned("ppo", 2e6, curve={"return": "-0.5"})
+    assert words(every(bptt, slower))[:3] == [CONFIRMED, DIFFERS, DIFFERS]  # one seed, nothing varied
+    # one set of rewards with which a claim holds is enough for it
+    assert words([*every(bptt, slower, variants=(OWN,)), *every(bptt, ppo, variants=(IDENTICAL,))])[1] == CONFIRMED
+    # PPO that never gets there says nothing about BPTT's share of its steps
+    never = learned("ppo", None, shipped={"hover": {"success": 0.2}})
+    assert words(every(bptt, never)) == [UNMEASURED] * 3 + [CONFIRMED, UNMEASURED, UNMEASURED]
+    # a run that was stopped has no reward to compare
+    assert words(every(bptt, learned("ppo", 5e6, finished=False, steps=6e6)))[2] == UNMEASURED
+
+
+def varied(variants: Sequence[str], one: dict[str, Any]) -> list[dict[str, Any]]:
+    """One seed of every variant in every task."""
+    return [one | {"task": task, "variant": variant} for task in TASKS for variant in variants]
+
+
+def test_a_claim_about_learning_is_refuted_only_if_the_rule_is_met() -> None:
+    claim = LEARNING.claims[5]
+    assert claim.invented
+    numbers = [variant for number in claim.invented for variant in number.variants]
     failed = {"hover": {"success": 0.2}}
-    assert verdicts(bptt, learned("ppo", None, shipped=failed))[4] == REFUTED
-    assert verdicts(bptt, learned("ppo", None, shipped=failed, finished=False))[4] == UNMEASURED
+    fails = [one for seed in seeds(learned("ppo", None, shipped=failed)) for one in every(seed)]
+    others = varied([variant for variant in numbers if AUTHORS not in variant], learned("ppo", None, shipped=failed))
+    able = varied(["elsewhere"], learned("ppo", 1e6))  # PPO can learn the tasks at all
+
+    def verdict(runs: list[dict[str, Any]]) -> Verdict:
+        return judge(claim, Found(runs))
+
+    assert verdict([*fails, *others, *able]).word == REFUTED
+    assert verdict([*fails, *others]).word == UNMEASURED
+    assert "does not learn" in verdict([*fails, *others]).why
+    two = [one for one in fails if one["seed"] < 2]
+    assert verdict([*two, *able]).word == DIFFERS
+    short = [one | {"steps": 1e6} for one in fails]
+    found = verdict([*short, *others, *able])
+    assert found.word == DIFFERS
+    assert "1 % of the paper's steps" in found.why
+    for number in claim.invented:
+        if set(number.variants) & {f"{AUTHORS}, {OWN}"}:
+            continue
+        unvaried = [one for one in others if one["variant"] not in number.variants]
+        assert f"not varied: {number.what}" in verdict([*fails, *unvaried, *able]).why
+    # with one choice of an invented number every task is learned: then the claim holds
+    name = f"{PAPER}, {VARIED[0][0]}"
+    remaining = [one for one in others if one["variant"] != name]
+    assert verdict([*fails, *remaining, *able, *varied([name], learned("ppo", 1e6))]).word == CONFIRMED
+
+
+def case(agrees: bool, runs: list[dict[str, Any]], claimed: float | None = 1e6, learns: bool = True) -> Claim:
+    sides = (Side(runs, claimed),)
+    number = Invented("a number", "1", ("other",))
+    return Claim("it is so", "-", lambda found: [Case("hover", agrees, learns, "-", sides)], invented=(number,))
+
+
+def test_the_rule_decides_the_word() -> None:
+    full = [{"task": "hover", "variant": "usual", "seed": seed, "steps": 1e6} for seed in range(3)]
+    found = Found([*full, full[0] | {"variant": "other"}])
+    assert judge(case(True, full), found).word == CONFIRMED
+    assert judge(case(False, full), found).word == REFUTED
+    assert judge(case(False, full, learns=False), found).word == UNMEASURED
+    assert judge(case(True, full, learns=False), found).word == UNMEASURED
+    for lacking, reason in (
+        (case(False, full[:2]), "only 2 seeds of 3"),
+        (case(False, full, claimed=1e8), "only 1 % of the paper's steps"),
+        (case(False, []), "only 0 seeds of 3"),
+        (dataclasses.replace(case(False, full), invented=None), "are not listed"),
+        (dataclasses.replace(case(False, full), theirs_alone="of their machine"), "of their machine"),
+    ):
+        told = judge(lacking, found)
+        assert told.word == DIFFERS
+        assert reason in told.why
+    assert "not varied: a number" in judge(case(False, full), Found(full)).why
+    early = [one | {"steps": 1e4, "held": {"0.99": {"steps": 1e3}}} for one in full]  # stopped because it had learned
+    assert judge(case(False, early), found).word == REFUTED
+    assert judge(dataclasses.replace(case(False, full), untestable="needs a vehicle"), found).word == UNTESTABLE
+
+
+def test_no_claim_is_refuted_by_default() -> None:
+    """A claim that lists nothing, or has no runs, cannot be refuted by any figure."""
+    against = [Case("x", False, True, "-")]
+    for experiment in EXPERIMENTS.values():
+        for claim in experiment.claims:
+            told = judge(dataclasses.replace(claim, cases=lambda found: against), Found([]))
+            assert told.word in (DIFFERS, UNTESTABLE), claim.says
+
+
+def test_the_variants_of_invented_numbers_are_runs() -> None:
+    for experiment in EXPERIMENTS.values():
+        variants = {run.variant for run in experiment.runs}
+        assert len({(run.task, run.algo, run.variant) for run in experiment.runs}) == len(experiment.runs)
+        for claim in experiment.claims:
+            for number in claim.invented or ():
+                assert set(number.variants) <= variants, (claim.says, number.what)
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("name", ["racing", *(name for name in WITH_RUNS if name not in ("racing", "ablation"))])
+def test_the_options_of_all_trainings_are_accepted(name: str) -> None:
+    """A run begins only after hours of others."""
+    for run in (run for run in EXPERIMENTS[name].runs if run.kind == "train"):
+        asked = parse([run.task, "--algo", run.algo, "--out", "never", *run.options])
+        assert asked.config.task.name == run.task
 
 
 def test_an_ablation_counts_where_the_full_reward_learns() -> None:
-    def row(task: str, algo: str, full: float, sparse: float) -> dict[str, Any]:
-        rates = {"success": [[full], [sparse]], "error": [[0.0], [0.0]]}
-        return {"task": task, "algo": algo, "variant": "paper", "variants": ["full", "sparse"], "seed": 0, **rates}
+    def row(task: str, full: float, sparse: float, steps: float = 1e8) -> dict[str, Any]:
+        rates = {"success": [[full], [sparse]], "error": [[0.0], [0.0]], "steps": steps, "seeds": 3}
+        curve = {"steps": "1 2", "success": [f"{full} {full}", f"{sparse} {sparse}"]}
+        about = {"task": task, "algo": "ppo", "variant": THEIRS, "variants": ["full", "sparse"], "seed": 0}
+        return about | rates | {"curve": curve}
 
-    def judge(*runs: dict[str, Any]) -> Verdict:
-        return without("sparse", ("land", "race"), ("ppo",), 2)(Found(runs, lambda name: None))
+    def told(*runs: dict[str, Any]) -> Verdict:
+        return judge(SPARSE, Found(runs))
 
-    learned, lost = row("race", "ppo", 1.0, 0.2), row("land", "ppo", 0.0, 0.0)
-    assert judge().word == UNMEASURED
-    assert judge(learned).word == UNMEASURED  # the other one is still to come
-    found = judge(learned, lost)
-    assert found.word == CONFIRMED
-    assert found.why == "not learned in these steps with the full reward either: land by PPO"
-    assert judge(row("race", "ppo", 1.0, 1.0), lost).word == REFUTED
-    assert judge(row("race", "ppo", 0.4, 0.0), lost).word == UNTESTABLE
-    assert missed(row("track", "ppo", 1.0, 0.0), "sparse")  # all crash before an error counts
+    learned, lost = row("race", 1.0, 0.2), row("land", 0.0, 0.0)
+    needed = [row(task, 1.0, 0.2) for task in TASKS]
+    assert told().word == told(learned).word == UNMEASURED
+    assert told(*needed).word == CONFIRMED
+    assert told(learned, lost).word == UNMEASURED
+    assert "does not learn: land" in told(learned, lost).why
+    spared = row("race", 1.0, 1.0)
+    assert told(spared).word == DIFFERS  # nothing was varied
+    as_authors = spared | {"variant": THEIR_AUTHORS}
+    assert told(spared, as_authors).word == REFUTED
+    assert told(spared, as_authors | {"success": [[1.0], [0.2]]}).word == UNMEASURED  # it is needed with other numbers
+    brief = row("race", 1.0, 0.989, steps=1e6)  # not worse by 2 points, but by half a point
+    assert told(brief).word == UNMEASURED
+    assert missed(row("track", 1.0, 0.0), "sparse")  # all crash before an error counts
+
+
+def test_a_level_is_held_from_the_first_of_five_evaluations_of_the_task_itself() -> None:
+    def points(*success: float, final: bool = True) -> list[dict[str, Any]]:
+        return [{"steps": 10.0 * i, "success": x, "final": final} for i, x in enumerate(success, 1)]
+
+    good = points(0.0, 1.0, 0.9, 1.0, 1.0, 1.0, 0.99, 1.0)
+    first = first_held(good, 0.99)
+    assert first is not None
+    assert first["steps"] == 40.0
+    assert first_held(good[:-1], 0.99) is None
+    assert first_held(points(*[1.0] * 9, final=False), 0.99) is None  # of an earlier stage of a curriculum
+    how = How(Path(), stop=0.99)
+    assert enough(good, how)
+    assert not enough(good[:-1], how)
+    assert not enough(good, How(Path()))
+    assert enough(good, How(Path(), most=80.0))
 
 
 @pytest.mark.whole

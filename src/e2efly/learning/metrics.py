@@ -57,6 +57,7 @@ def rows_of(
             row[f"eval/{name}/success"] = float(np.mean(e.success)) if last else ""
             row[f"eval/{name}/final_error"] = float(np.mean(e.final_error)) if last else ""
             row[f"eval/{name}/duration"] = float(np.mean(e.duration)) if last else ""
+            row[f"eval/{name}/reward"] = float(np.mean(e.reward)) if last else ""
         rows.append(row | {name: float(x[i]) for name, x in sorted(metrics.items())})
     return rows
 

@@ -53,14 +53,14 @@ def plot_flights(
     """
     things = scene(task, flights)
     tracks = [flights.position[:k, i] for i, k in enumerate(flights.length)]
-    low, high = _bounds(tracks, things, solids)
+    low, high = bounds(tracks, things, solids)
     speeds = _paths(flights)[1]
     fastest = speeds[np.isfinite(speeds)].max(initial=0.0)
     norm = Normalize(0.0, max(fastest, 0.1))
     with figure(path, title, 4.8 if _is_flat(high - low) else 5.8, notes, free=True) as fig:
         solid: Solid = fig.add_axes((0.01, 0.10, 0.55, 0.83), projection="3d", computed_zorder=False)
-        _solid(solid, flights, things, low, high, norm)
-        _fit(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))
+        draw_flights(solid, flights, things, low, high, norm)
+        fit_box(fig, solid, low, high, Bbox.from_extents(0.012, 0.09, 0.55, 0.91))
         draw_space(solid, solids)
         plan = fig.add_axes((0.63, 0.21, 0.275, 0.65))
         _plan(plan, flights, things, low, high, norm)
@@ -73,7 +73,7 @@ def plot_flights(
         fig.legend(handles=_legend(flights, things), loc="lower center", bbox_to_anchor=(0.5, 0.0), ncols=6)
 
 
-def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
+def fit_box(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
     """Zoom and shift 3D axes so that their box and labels fill `room`, in fractions of the figure."""
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     zoom = 1.0
@@ -95,8 +95,8 @@ def _fit(fig: Figure, ax: Solid, low: Corner, high: Corner, room: Bbox) -> None:
     ax.set_position((at.x0 + shift[0], at.y0 + shift[1], at.width, at.height))
 
 
-def _bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[FacesBody]) -> tuple[Corner, Corner]:
-    """Corners of a box around everything that is drawn, with the ground and a margin, at least 0.6 m wide."""
+def bounds(tracks: list[np.ndarray], things: list[Thing], solids: Sequence[FacesBody]) -> tuple[Corner, Corner]:
+    """Two corners of a box around everything that is drawn, with the ground and a margin, at least 0.6 m wide."""
     points = [np.atleast_2d(thing.point if isinstance(thing, Mark) else thing.points) for thing in things]
     points += [body.quads.reshape(-1, 3) for body in solids]
     whole = np.concatenate([*tracks, *points]) if tracks or points else np.zeros((1, 3))
@@ -130,7 +130,8 @@ def _ends(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
     return flights.position[0, kept], last[~flights.success[kept].astype(bool)]
 
 
-def _solid(ax: Solid, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+def draw_flights(ax: Solid, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+    """Draw episodes in 3D axes, coloured by speed, with their shadows and the objects of the task, between corners."""
     (x0, y0, z0), (x1, y1, _) = low, high
     ground = np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]])
     ax.add_collection3d(Poly3DCollection([ground], facecolors="#EFEFEC", edgecolors="none", zorder=0))
