@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.commands.terminal import markdown
+from e2efly.config import Given
+from e2efly.runs.paper import AUTHORS, SILENT
+from e2efly import tasks
 
 DOCS = Path(__file__).parent
 BENCHMARKS = DOCS.parent / "benchmarks"
@@ -69,6 +72,11 @@ virtual world.
                 Wu, Shuyu and Yu, Wenxian and Zou, Danping}
     }
 """
+GIVEN = """The preset `paper` has the paper's numbers, and where the paper gives none, the first ones below. The preset
+`authors` has the others in their place. A weight of 0 leaves a term out.
+"""
+LONGEST = 70
+"""Most characters of a value in the table of numbers."""
 PICTURES = {
     "learning": (
         ("paper_learning_paper.png", "rewards and success of PPO and BPTT against steps, preset paper"),
@@ -103,7 +111,26 @@ def page() -> str:
     for name, part in parts.items():
         lines += [*section(name, part, parts), ""]
     commands = [{"the paper's experiment": what, "ours": how} for what, how in COMMANDS.items()]
+    lines += ["## Numbers that the paper does not give", "", GIVEN, *markdown(numbers()), ""]
     return "\n".join([*lines, "## Which command repeats it", "", *markdown(commands), "", TAIL])
+
+
+def numbers() -> list[dict[str, str]]:
+    """Every number of the presets `paper` and `authors` that is not in the paper, with its source."""
+
+    def rows(task: str, preset: str, given: tuple[Given, ...]) -> list[dict[str, str]]:
+        return [
+            {"task": task, "preset": preset, "by": one.algo.upper() or "all", "number": f"`{one.field}`",
+             "value": str(one.value) if len(str(one.value)) < LONGEST else "a whole part of the options",
+             "source": one.source}
+            for one in given
+        ]  # fmt: skip
+
+    found = rows("all", "paper, authors", SILENT) + rows("all", "authors", AUTHORS)
+    for name, task in tasks.TASKS.items():
+        if task.paper is not None:
+            found += rows(name, "paper, authors", task.paper.silent) + rows(name, "authors", task.paper.authors)
+    return found
 
 
 def overview(parts: dict[str, Any]) -> list[dict[str, str]]:
