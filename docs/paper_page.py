@@ -10,10 +10,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from e2efly import tasks
 from e2efly.commands.terminal import markdown
 from e2efly.config import Given
 from e2efly.runs.paper import AUTHORS, SILENT
-from e2efly import tasks
 
 DOCS = Path(__file__).parent
 BENCHMARKS = DOCS.parent / "benchmarks"
