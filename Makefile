@@ -53,6 +53,7 @@ zoo: $(READY)
 docs: $(DOCS_READY)
 	$(BIN)/python docs/figures.py
 	$(BIN)/python docs/paper_page.py
+	$(BIN)/python docs/hardware_pages.py
 	$(BIN)/python docs/zoo_cards.py
 	$(BIN)/python docs/command_line.py
 	$(BIN)/python docs/notebook_pages.py

@@ -109,6 +109,20 @@ def test_the_page_of_the_papers_claims_is_what_was_measured() -> None:
     assert (DOCS / "paper.md").read_text(encoding="utf-8") == script("paper_page").page()
 
 
+@pytest.mark.parametrize("name", ["vis_r", "vis_h"])
+def test_the_page_and_the_drawing_of_a_vehicle_are_what_its_files_say(name: str) -> None:
+    pages = script("hardware_pages")
+    text = pages.where(name).read_text(encoding="utf-8")
+    assert text == pages.page(name)
+    assert pages.where(name).with_suffix(".svg").read_text(encoding="utf-8") == pages.picture(name)
+    without, _, paper, difference, loaded, _ = pages.sums(name, *pages.lists(name))
+    told = [f"{loaded['mass, g']} g"]
+    told += [f"{abs(int(difference['mass, g']))} g lighter", f"{paper['mass, g']} g"] if name == "vis_r" else []
+    told += [f"{int(difference['price, USD'])} USD above"] if name == "vis_r" else [f"{without['mass, g']} g without"]
+    written = (DOCS / "hardware-vis-r.md").read_text(encoding="utf-8").split(pages.END)[1]
+    assert all(words in written for words in told)
+
+
 def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:
     page = (DOCS / "zoo.md").read_text(encoding="utf-8")
     for vehicle, tasks in contents().items():

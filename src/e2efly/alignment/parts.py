@@ -12,13 +12,17 @@ from typing import Any
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.purchases import Purchase, read_ground, read_purchase
 from e2efly.config.names import unknown
 from e2efly.config.tables import number, numbers, read_table, shown, text
 from e2efly.control import Quat, Vec3
 
 DRAWS = 4000
 """Number of draws of the Monte Carlo simulation over the tolerances. It gives a standard deviation within 1.1 %."""
-_KEYS = {"name", "shape", "size", "mass", "place", "angles", "tolerance", "file"}
+_KEYS = {
+    "name", "shape", "size", "mass", "place", "angles", "tolerance", "file", "battery", "price_usd", "date", "source",
+    "estimate",
+}  # fmt: skip
 _TOLERANCES = {"mass", "size", "place"}
 
 
@@ -43,6 +47,10 @@ class Part:
     """Standard deviation of each dimension, m. For a mesh, of the factor."""
     place_sigma: float
     """Standard deviation of the position, m per axis."""
+    purchase: Purchase
+    """Where to buy it, and where its numbers come from."""
+    battery: bool = False
+    """Whether it is the battery."""
     unit: tuple[np.ndarray, np.ndarray] | None = None
     """For a mesh at factor 1: its centre of mass, m, and its inertia about that point divided by its mass, m^2."""
 
@@ -147,11 +155,23 @@ def read_parts(path: Path) -> tuple[Part, ...]:
     Raises:
         ValueError: naming the file, the part, the key, the value and what is accepted.
     """
-    table = read_table(path)
-    listed = table.get("part")
-    if set(table) != {"part"} or not isinstance(listed, list) or not listed:
-        raise ValueError(f"{path}: has the keys {', '.join(table) or 'none'}; accepted: tables [[part]], one or more")
+    listed = _listed(path)["part"]
     return tuple(_part(f"{path}: part {i}", entry, path.parent) for i, entry in enumerate(listed, 1))
+
+
+def read_on_the_ground(path: Path) -> tuple[Purchase, ...]:
+    """What a list of parts names beside the vehicle: tables `[[ground]]`. Errors are as for `read_parts`."""
+    listed = _listed(path)["ground"]
+    return tuple(read_ground(f"{path}: ground {i}", entry) for i, entry in enumerate(listed, 1))
+
+
+def _listed(path: Path) -> dict[str, list[Any]]:
+    table = {"ground": [], **read_table(path)}
+    lists = all(isinstance(entries, list) for entries in table.values())
+    if set(table) != {"part", "ground"} or not lists or not table["part"]:
+        found = ", ".join(key for key in table if table[key]) or "none"
+        raise ValueError(f"{path}: has the keys {found}; accepted: tables [[part]], one or more, and [[ground]]")
+    return table
 
 
 def _part(where: str, entry: Any, folder: Path) -> Part:
@@ -179,10 +199,15 @@ def _part(where: str, entry: Any, folder: Path) -> Part:
         if "file" in entry:
             raise ValueError(f"{where}: file is {shown(entry['file'])}; accepted only where shape is 'mesh'")
         size = _size(where, shape, entry.get("size"))
+    battery = entry.get("battery", False)
+    if type(battery) is not bool:
+        raise ValueError(f"{where}: battery is {shown(battery)}; accepted: true or false")
+    places = _places(where, entry["place"])
     return Part(
-        name, shape, size, positive(f"{where}: mass", entry["mass"]), _places(where, entry["place"]),
+        name, shape, size, positive(f"{where}: mass", entry["mass"]), places,
         _turn(numbers(f"{where}: angles", entry.get("angles", [0.0, 0.0, 0.0]), 3, " of radians")),
-        off.get("mass", 0.0), off.get("size", 0.0), off.get("place", 0.0), unit,
+        off.get("mass", 0.0), off.get("size", 0.0), off.get("place", 0.0),
+        read_purchase(where, entry, len(places)), battery, unit,
     )  # fmt: skip
 
 
