@@ -119,7 +119,9 @@ def differences(trained: Domain, flown: Domain, whose: str) -> tuple[str, ...]:
         middle, value = _middle(range), _farthest(range, part)
         if abs(value - middle) > ALIKE * abs(middle):
             by = f"{_difference(range, part)} of {whose}"
-            found.append(f"{part.name} {part.range}: {by}" + f"; trained for {_accepted(range)}" * (range.low < range.high))
+            found.append(
+                f"{part.name} {part.range}: {by}" + f"; trained for {_accepted(range)}" * (range.low < range.high)
+            )
     return tuple(found)
 
 
