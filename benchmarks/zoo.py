@@ -48,7 +48,6 @@ from e2efly.learning.onnx_export import write_policy
 from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import is_sealed
 from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
-from e2efly.runs import presets
 from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS

@@ -139,9 +139,9 @@ class Contract:
         rate, reasons = self.control_rate_hz, list(() if vehicle is None else self.misfits(vehicle))
         if vehicle is not None and reasons:
             other = f"any/{self.task}" if not self.of_family and self.task in contents().get("any", {}) else ""
-            reasons.append(
-                f"what flies {vehicle.name!r}: a policy that is trained for it, by `e2efly train {self.task} --vehicle "
-                f"FILE`{f', or that of any vehicle, {other}' if other else ''}"
+            reasons[-1] += (
+                f"; what flies it is a policy that is trained for it, by `e2efly train {self.task} --vehicle FILE`"
+                f"{f', or that of any vehicle, {other}' if other else ''}"
             )
         if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:  # true for NaN
             reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")

@@ -33,8 +33,8 @@ OF_MODE = {
 }
 """Fields that policies of a command mode are compared by, besides: those that decide what a command means."""
 AT_LEAST, AT_MOST = ("body_rate_max", "roll_rate_max", "yaw_rate_max"), "radius"
-"""Quantities that a vehicle may exceed, and may fall short of. A flight controller may accept higher rates than the policy commands, and a vehicle may be smaller than in the
-training."""
+"""Quantities of which a vehicle may have more than the training, and less: a flight controller may accept higher rates
+than a policy commands, and a vehicle may be smaller."""
 ALIKE = 0.005
 """Relative difference from the vehicle of the training below which it is not worth a word."""
 
@@ -118,10 +118,8 @@ def differences(trained: Domain, flown: Domain, whose: str) -> tuple[str, ...]:
         range = known.get(part.name, part)
         middle, value = _middle(range), _farthest(range, part)
         if abs(value - middle) > ALIKE * abs(middle):
-            by = f"{_difference(range, part)} of {whose}"
-            found.append(
-                f"{part.name} {part.range}: {by}" + f"; trained for {_accepted(range)}" * (range.low < range.high)
-            )
+            trained_for = f"; trained for {_accepted(range)}" if range.low < range.high else ""
+            found.append(f"{part.name} {part.range}: {_difference(range, part)} of {whose}{trained_for}")
     return tuple(found)
 
 
