@@ -258,6 +258,7 @@ def _field(contract: Contract, name: str, /, **changes: Any) -> Contract:
     return dataclasses.replace(contract, observation=tuple(fields))
 
 
+LIGHT = drawn_domain(dataclasses.replace(VEHICLE, name="light", mass=0.6, rotor_thrust_max=4.1), "ctbr", {"mass": 0.1})
 REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
     (
         lambda c: dataclasses.replace(c, vehicle_hash="0" * 16, vehicles=None),

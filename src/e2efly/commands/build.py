@@ -45,6 +45,8 @@ class Build:
     vehicle: str = "vis_r"
     """For a list of parts, the vehicle that it resembles: a name or a .toml file. What parts do not tell keeps its
     values: thrust, motors, drag, rate loop, delay."""
+    mass: tuple[float, float] | None = None
+    """For a list of parts: mass of the whole vehicle and standard deviation of the scale, kg."""
     out: Path = Path("built")
     """Folder for vehicle.toml, and for each task a folder with its policy.onnx."""
     tasks: tuple[str, ...] = PAPER
@@ -105,7 +107,7 @@ def run(options: Build) -> int:
 
 def vehicle_of(o: Build, folder: Path) -> Path:
     """The vehicle file, written into a folder that has none, or the same one."""
-    from e2efly.alignment.estimates import fuse
+    from e2efly.alignment.estimates import fuse, weighed
     from e2efly.alignment.parts import estimates
     from e2efly.alignment.vehicle_file import write_vehicle
 
@@ -113,9 +115,12 @@ def vehicle_of(o: Build, folder: Path) -> Path:
     if "part" in read_table(o.parts):
         with tempfile.TemporaryDirectory() as made:
             new = Path(made) / path.name
-            write_vehicle(new, o.vehicle, load_vehicle(o.vehicle), fuse(estimates(o.parts, centre=True)))
+            said = [*([weighed(o.mass)] if o.mass else []), *estimates(o.parts, centre=True)]
+            write_vehicle(new, o.vehicle, load_vehicle(o.vehicle), fuse(said))
             content = new.read_bytes()
     else:
+        if o.mass:
+            raise ValueError(f"--mass is {' '.join(map(str, o.mass))}; accepted: with a list of parts")
         load_vehicle(o.parts)
         content = o.parts.read_bytes()
     if path.exists() and path.read_bytes() != content:
@@ -149,12 +154,13 @@ def _build(o: Build, out: Path) -> int:
     said = f"mass {vehicle.mass:.3f} kg, thrust to weight {vehicle.thrust_to_weight:.2f}"
     console.print(f"Vehicle: {file} ({said}, inertia {', '.join(f'{1e3 * x:.2f}' for x in vehicle.inertia)} g m^2)")
     done: dict[str, Any] = read_json(out / REPORT)["tasks"] if (out / REPORT).exists() else {}
-    rows = []
+    rows, shown = [], ()
     for number, task in enumerate(o.tasks, 1):
         how, start = plan(task, vehicle, file, o), time.perf_counter()
-        console.rule(f"{number} of {len(o.tasks)}, {task}: {how.text(str(file))}")
-        for line in how.differences:
+        for line in () if how.differences == shown else how.differences:
             console.print(line, style="dim")
+        shown = how.differences
+        console.print(f"{number} of {len(o.tasks)}, {task}: {how.text(str(file))}")
         policy = out / task / "policy.onnx"
         if status := _make(how, policy, file):
             return status
@@ -167,7 +173,6 @@ def _build(o: Build, out: Path) -> int:
             done[task] |= {"differences": how.differences, "seconds": seconds, "criteria": flown}
             write_json(out / REPORT, {"parts": str(o.parts), "like": o.vehicle, "tasks": done})
         rows += _rows(task, done[task])
-    console.rule(f"policies of {file}")
     console.print(console_table(rows))
     console.print(f"All of this took {time.perf_counter() - began:.0f} s. Look at what a flight needs, and then fly:")
     console.print(
