@@ -265,11 +265,7 @@ REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
         "vehicle 'vis_r' has hash .*; accepted: 0000",
     ),
     (
-        lambda c: dataclasses.replace(
-            c,
-            vehicle_hash="0" * 16,
-            vehicles=drawn_domain(dataclasses.replace(VEHICLE, mass=0.6), "ctbr", {"mass": 0.1}),
-        ),
+        lambda c: dataclasses.replace(c, vehicle_hash="0" * 16, vehicles=LIGHT),
         "mass of vehicle 'vis_r' is 0.75 kg, 25 % more than the 0.6 kg of 'vis_r'; accepted: 0.54 to 0.66 kg",
     ),
     (lambda c: dataclasses.replace(c, control_rate_hz=100.0), "control_rate is 30.0 Hz; accepted: 100 Hz"),
