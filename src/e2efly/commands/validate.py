@@ -192,7 +192,7 @@ def _folder(o: Validate, flew: "Candidate") -> Path:
 
 
 def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
-    """Fly whole flights, if the plant is the firmware and the vehicle is the policy's. Returns whether all were
+    """Fly whole flights, if the plant is the firmware and the policy flies the vehicle. Returns whether all were
     complete.
     """
     from e2efly.commands.rehearsals import flights_table, fly_whole
