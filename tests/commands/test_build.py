@@ -36,9 +36,10 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     def learn(arguments: list[str]) -> int:
         asked.append(arguments)
         out = Path(arguments[arguments.index("--out") + 1] if "--out" in arguments else arguments[1])
+        assert "--overwrite" in arguments or "--resume" in arguments or not (out / "policy.onnx").exists()
         out.mkdir(parents=True, exist_ok=True)
         for name in ("policy.onnx", "config.json", "summary.json"):
-            (out / name).write_text("{}")
+            (out / name).write_text('{"finished": true}')
         return 0
 
     monkeypatch.setattr(train, "parse", lambda arguments: arguments)
@@ -92,15 +93,17 @@ def test_a_vehicle_outside_of_every_range_is_trained_for_and_a_stopped_build_goe
     said = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["hover", "taken:", "any/hover"] in said
     assert ["land_visual", "trained:", "preset", "robust,", "2.0", "M", "steps"] in said
+    assert run(["build", str(parts), "--out", str(out), "--tasks", "hover"]) == 0
+    assert (out / "hover" / "policy.onnx").read_bytes() == policy_file("any/hover").read_bytes()
     asked = ["build", str(parts), "--out", str(out), "--tasks", "hover", "land_visual", "--train", "hover"]
     assert run(asked) == 0
     file = str(out / "vehicle.toml")
     first = ["hover", "--preset", "identified", "--vehicle", file, "--out", str(out / "hover"), "--no-plots"]
     second = ["land_visual", "--preset", "robust", "--vehicle", file, "--out", str(out / "land_visual"), "--no-plots"]
     assert trained == [first, second]
-    assert run(asked) == 0
+    assert run(asked[:-2]) == 0  # without --train: what is trained already is kept
     assert len(trained) == 2
-    (out / "hover" / "summary.json").unlink()
+    (out / "hover" / "summary.json").write_text('{"finished": false}')
     (out / "hover" / "checkpoint.safetensors").write_bytes(b"")
     (out / "land_visual" / "summary.json").unlink()  # stopped before its first checkpoint
     assert run(asked) == 0

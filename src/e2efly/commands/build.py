@@ -137,7 +137,8 @@ def plan(task: str, vehicle: Vehicle, file: Path, o: Build) -> Plan:
     """How a task gets its policy: a shipped one that was trained for a range that contains the vehicle, one for a
     single vehicle before one for a family; otherwise by training.
     """
-    having = [whose for whose, tasks in zoo.contents().items() if task in tasks and task not in o.train]
+    trains = task in o.train or (o.out / task / "config.json").exists()  # a training that began goes on
+    having = [whose for whose, tasks in zoo.contents().items() if task in tasks and not trains]
     for whose in sorted(having, key=lambda name: (name == presets.FAMILY, name != o.vehicle)):
         contract = load_policy(f"{whose}/{task}").contract
         if not contract.misfits(vehicle):
@@ -192,10 +193,13 @@ def _make(how: Plan, policy: Path, file: Path) -> int:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(copy, kept.read_bytes())
         return 0
-    if (run.path / "summary.json").exists():
+    if (run.path / "summary.json").exists() and run.read_json("summary.json")["finished"]:
         return 0
     if run.checkpoint.exists():
         return train.run(train.parse(["--resume", str(run.path), "--no-plots"]))
+    if not (run.path / "config.json").exists():  # what was taken before
+        policy.unlink(missing_ok=True)
+        samples_file(policy).unlink(missing_ok=True)
     began = ["--overwrite"] if (run.path / "config.json").exists() else []
     asked = [how.task, "--preset", how.preset, "--vehicle", str(file), "--out", str(run.path), "--no-plots", *began]
     return train.run(train.parse(asked))
