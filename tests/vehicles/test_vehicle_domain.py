@@ -5,10 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from e2efly.config import EnvConfig
 from e2efly.config.domain import Domain
+from e2efly.environment.limits import vehicles_of
 from e2efly.policy.contract import Contract
 from e2efly.policy.loader import load_policy
 from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.posterior import Entry, Posterior
 from e2efly.vehicles.vehicle import CONTROLLED, Vehicle, quantities, terms
 from e2efly.vehicles.vehicle_domain import FELT, OF_MODE, drawn_domain, misfits, vehicle_domain
 
@@ -134,3 +137,17 @@ def test_the_ranges_travel_in_the_contract() -> None:
     old = dataclasses.replace(HOVER, vehicles=None)
     assert Contract.from_json(old.to_json()) == old
     assert old.refusals(changed(mass=1.01))[0].startswith("vehicle 'mine' has hash ")
+
+
+def test_an_identified_vehicle_has_the_ranges_of_its_widest_draws() -> None:
+    entries = tuple(map(Entry.of, ("mass", "thrust_map", "inertia[0]", "latency")))
+    posterior = Posterior(entries, np.diag([0.04, 0.02, 0.1, 0.002]))
+    config = EnvConfig(randomize={"identified": 1.0, "rate_gain": 0.3})
+    ranges = {part.name: part for part in vehicles_of(config, OWN, posterior)}
+    own = {part.name: part.low for part in vehicle_domain(OWN, "ctbr")}
+    low = {name: part.low / own[name] for name, part in ranges.items() if own[name]}
+    assert low["mass"] == pytest.approx(np.exp(-0.1))
+    assert low["inertia_x"] == pytest.approx(np.exp(-0.25)) and low["inertia_y"] == pytest.approx(1.0)
+    assert low["rate_gain_x"] == pytest.approx(0.7)
+    assert low["hover_thrust"] == pytest.approx(np.exp(-0.1) / (2 - np.exp(-0.05)))  # of the ceiling, too
+    assert "latency" not in ranges  # the contract has the delays that were drawn

@@ -52,10 +52,11 @@ def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None
     both sides. What an episode's disturbances take of the thrust is no property of the vehicle, and stays a reserve.
     """
     shares: dict[str, Any] = {name: width for name, width in config.randomize.items() if name != IDENTIFIED}
-    for entry in () if posterior is None else posterior.entries:
+    entries = () if posterior is None else zip(posterior.entries, posterior.sigma.values(), strict=True)
+    for entry, sigma in entries:
         if entry.field in ADDED:
             continue
-        share = -np.expm1(-WIDEST * posterior.sigma[entry.name])
+        share = -np.expm1(-WIDEST * sigma)
         for name in (entry.field, *TOGETHER.get(entry.field, ())):
             own = np.shape(getattr(vehicle, name))
             each = np.array(shares.get(name, np.zeros(own)), np.float64)
