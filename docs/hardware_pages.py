@@ -36,7 +36,7 @@ CAMERAS = {
         ("camera ahead: RealSense D435i", "race_clutter", "avoid and race_clutter see"),
         ("camera down: ELP-USB500W05G-L180", "land_visual", "land_visual sees"),
     ),
-    "vis_h": (("camera ahead: RunCam Phoenix 2 Nano", "race_clutter", "avoid and race_clutter, by virtual images,"),),
+    "vis_h": (("camera ahead: RunCam Phoenix 2 Nano", "race_clutter", "virtual images see"),),
 }
 """For each camera of a drawing: its part, the policy whose contract has its mount, and words for the legend."""
 
@@ -71,33 +71,37 @@ def picture(name: str) -> str:
 def made(name: str) -> str:
     """What stands between the marks of a page."""
     (parts, ground), vehicle = lists(name), load_vehicle(name)
-    rows = [{"": i, **bought(part.purchase), **mass(part)} for i, part in enumerate(parts, 1)]
-    order = ("", "part", "pieces", "g each", "USD each", "price as of", "mass", "price")
+    rows = [{"": i, **bought(part.purchase, part.mass)} for i, part in enumerate(parts, 1)]
     lines = [f"![{TITLES[name]}, from above and from the right]({where(name).stem}.svg)", ""]
-    lines += [*markdown([{key: row[key] for key in order} for row in rows]), "", "What stays on the ground:", ""]
-    order = ("part", "pieces", "USD each", "price as of", "price")
-    lines += [*markdown([{key: bought(thing)[key] for key in order} for thing in ground]), "", "### Sums", ""]
-    lines += [*markdown(sums(name, parts, ground)), "", "### With the battery", ""]
+    lines += [*markdown(rows), "", "What stays on the ground:", ""]
+    lines += [*markdown([{"": chr(ord("a") + i), **bought(thing)} for i, thing in enumerate(ground)]), ""]
+    lines += ["How the numbers with ~ were estimated:", ""]
+    things = [*((str(i), part.purchase) for i, part in enumerate(parts, 1)), *zip("abcdefgh", ground, strict=False)]
+    lines += [f"- **{mark}** {note}" for mark, thing in things if (note := notes(thing))]
+    lines += ["", "### Sums", "", *markdown(sums(name, parts, ground)), "", "### With the battery", ""]
     return "\n".join([*lines, *markdown(flown(vehicle, parts))])
 
 
-def bought(thing: Purchase) -> dict[str, Any]:
-    """The cells of a row that are about buying it."""
-    price = "" if thing.price is None else f"{thing.price:.2f}" if thing.price % 1 else f"{thing.price:g}"
-    cells = {"part": thing.name, "pieces": thing.count, "USD each": price, "price as of": thing.date or ""}
-    return {**cells, "price": told(thing, "price_usd")}
+def bought(thing: Purchase, mass: float | None = None) -> dict[str, Any]:
+    """A row of the table of parts. A number leads to the page that says it, and has a ~ if it is an estimate."""
+    cells: dict[str, Any] = {"part": thing.name, "pieces": thing.count}
+    if mass is not None:
+        cells["g each"] = told(thing, "mass", f"{1e3 * mass:.3g}")
+    usd = "" if thing.price is None else f"{thing.price:.2f}" if thing.price % 1 else f"{thing.price:g}"
+    return {**cells, "USD each": told(thing, "price_usd", usd), "price as of": thing.date or ""}
 
 
-def mass(part: Part) -> dict[str, Any]:
-    """The cells of a row that are about the mass."""
-    return {"g each": f"{1e3 * part.mass:.3g}", "mass": told(part.purchase, "mass")}
-
-
-def told(thing: Purchase, number: str) -> str:
-    """Where a number is from: a page, an estimate, or an estimate from what a page says."""
+def told(thing: Purchase, number: str, words: str) -> str:
+    """A number with its page, or with the mark of an estimate, or both."""
+    words = f"~{words}" if number in thing.estimate else words
     page = thing.source.get(number)
-    estimate = re.sub(r"\((https://[^)]+)\)", r"([page](\1))", thing.estimate.get(number, ""))
-    return "; ".join(([f"[page]({page})"] if page else []) + ([f"**estimate**: {estimate}"] if estimate else []))
+    return f"[{words}]({page})" if page else words
+
+
+def notes(thing: Purchase) -> str:
+    """How the numbers of a row were estimated."""
+    said = (f"{what.removesuffix('_usd')}: {text}" for what, text in thing.estimate.items())
+    return re.sub(r"\((https://[^)]+)\)", r"([page](\1))", ". ".join(said))
 
 
 def sums(name: str, parts: tuple[Part, ...], ground: tuple[Purchase, ...]) -> list[dict[str, str]]:

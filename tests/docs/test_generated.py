@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from e2efly.alignment.parts import prototype
 from e2efly.commands.train import parse
 from e2efly.config import StageConfig
 from e2efly.policy.zoo import FOLDER, USUAL, contents, curve_file, policy_file
@@ -121,6 +122,10 @@ def test_the_page_and_the_drawing_of_a_vehicle_are_what_its_files_say(name: str)
     told += [f"{int(difference['price, USD'])} USD above"] if name == "vis_r" else [f"{without['mass, g']} g without"]
     written = (DOCS / "hardware-vis-r.md").read_text(encoding="utf-8").split(pages.END)[1]
     assert all(words in written for words in told)
+    found = prototype(pages.lists(name)[0])
+    spread = zip(1e3 * np.diag(found.inertia), 1e3 * np.diag(found.inertia_sigma), strict=True)
+    inertia = ", ".join(f"{value:.2f} ± {sigma:.2f}" for value, sigma in spread)
+    assert f"| {inertia} |" in (DOCS / "identification.md").read_text(encoding="utf-8")
 
 
 def test_every_policy_of_the_zoo_has_a_card_and_pictures() -> None:

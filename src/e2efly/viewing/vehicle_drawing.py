@@ -37,8 +37,8 @@ class Mounted:
     """Angle of its axis below the body's x axis, rad: -0.35 looks 20 degrees up, pi/2 straight down."""
     fov: tuple[float, float]
     """Horizontal and vertical field of view that a policy was trained with, rad."""
-    tasks: str
-    """The tasks whose policies see by it, for the legend."""
+    seen: str
+    """Words for the legend, before how much is seen of its image: `land_visual sees`."""
 
     @property
     def angle(self) -> str:
@@ -51,7 +51,7 @@ class Mounted:
     def words(self) -> str:
         """Where it looks, and how much of its image a policy sees."""
         across, down = (round(math.degrees(x)) for x in self.fov)
-        return f"{self.angle}; {self.tasks}: {across}° x {down}° of it"
+        return f"{self.angle}; {self.seen} {across}° x {down}°"
 
 
 def drawing(vehicle: Vehicle, title: str, parts: tuple[Part, ...], cameras: tuple[Mounted, ...]) -> str:
