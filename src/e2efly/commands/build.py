@@ -60,7 +60,7 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PolicyPlan:
     """How a task gets its policy."""
 
     task: str
@@ -133,7 +133,7 @@ def vehicle_of(o: Build, folder: Path) -> Path:
     return path
 
 
-def plan(task: str, vehicle: Vehicle, file: Path, o: Build) -> Plan:
+def plan(task: str, vehicle: Vehicle, file: Path, o: Build) -> PolicyPlan:
     """How a task gets its policy: a shipped one that was trained for a range that contains the vehicle, one for a
     single vehicle before one for a family; otherwise by training.
     """
@@ -142,10 +142,10 @@ def plan(task: str, vehicle: Vehicle, file: Path, o: Build) -> Plan:
     for whose in sorted(having, key=lambda name: (name == presets.FAMILY, name != o.vehicle)):
         contract = load_policy(f"{whose}/{task}").contract
         if not contract.misfits(vehicle):
-            return Plan(task, f"{whose}/{task}", differences=contract.differences(vehicle))
+            return PolicyPlan(task, f"{whose}/{task}", differences=contract.differences(vehicle))
     uncertain = any((sigma > 0).any() for sigma in read_sigmas(file).values())
     begins = task in zoo.contents().get(presets.FAMILY, {}) and uncertain
-    return Plan(task, None, presets.IDENTIFIED if begins else presets.ROBUST)
+    return PolicyPlan(task, None, presets.IDENTIFIED if begins else presets.ROBUST)
 
 
 def _build(o: Build, out: Path) -> int:
@@ -183,7 +183,7 @@ def _build(o: Build, out: Path) -> int:
     return 0
 
 
-def _make(how: Plan, policy: Path, file: Path) -> int:
+def _make(how: PolicyPlan, policy: Path, file: Path) -> int:
     """Take or train a policy, unless it is there. Returns the exit status of the training."""
     run = RunDirectory(policy.parent)
     if how.taken is not None:
