@@ -17,8 +17,8 @@ vehicles in still air. The success that is stated is that of the lone ONNX file,
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
-`--domains` trains nothing: it writes into the contract of each file that says nothing of its courses the domain of its
-preset's task, by which it was trained; the graph with its weights stays, byte by byte.
+`--domains` trains nothing: it writes into the contract of each file that says nothing of its courses or vehicles the
+ranges of the configuration beside it, by which it was trained; the graph with its weights stays, byte by byte.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
@@ -40,6 +40,7 @@ import onnx
 from common import arguments, table
 
 from e2efly.config.storage import write_json
+from e2efly.environment.limits import posterior_of, vehicles_of
 from e2efly.environment.stress_rows import ALL
 from e2efly.flight.sight.samples import COUNT, packed, samples_file
 from e2efly.learning.judge import worst_success
@@ -47,13 +48,12 @@ from e2efly.learning.onnx_export import write_policy
 from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import is_sealed
 from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
-from e2efly.runs import presets
-from e2efly.runs.inputs import to_json
+from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import candidate
 from e2efly.vehicles.family import family_names
-from e2efly.vehicles.loading import vehicle_names
+from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
@@ -176,14 +176,18 @@ def starts_of(policy: Path) -> dict[str, np.ndarray]:
 
 
 def declare(file: Path) -> None:
-    """Let the contract of a file say for which courses it was trained, if it does not."""
-    vehicle, task = file.parent.name, file.stem
-    kind, preset = recipe(vehicle, task)
+    """Let the contract of a file say for which courses and vehicles it was trained, if it does not."""
+    config = from_json(json.loads(config_file(file).read_text()), str(config_file(file)))
     contract, graph = load_policy(file).contract, onnx.load(file).graph
-    if contract.courses is None:
-        courses = presets.preset(kind, TASKS[kind].best, preset or presets.NOMINAL).task.domain()
-        write_policy(file, graph, dataclasses.replace(contract, courses=courses))
+    about = {"courses": contract.courses or config.task.domain(), "vehicles": contract.vehicles}
+    if not contract.of_family and contract.vehicles is None:
+        vehicle = load_vehicle(config.env.vehicle)
+        assert vehicle.hash == contract.vehicle_hash, file
+        about["vehicles"] = vehicles_of(config.env, vehicle, posterior_of(config.env))
+    if (declared := dataclasses.replace(contract, **about)) != contract:
+        write_policy(file, graph, declared)
         assert onnx.load(file).graph.SerializeToString() == graph.SerializeToString(), file
+        print(file.relative_to(FOLDER), len(declared.domain), "ranges", flush=True)
 
 
 def write(zoo: dict[str, dict[str, dict[str, Any]]]) -> None:

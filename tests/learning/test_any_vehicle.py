@@ -184,7 +184,7 @@ def test_any_vehicle_within_loads_and_others_are_named(trained: Path, tmp_path: 
     for name in ("vis_r", "vis_h", "crazyflie"):
         e2efly.load_policy(trained, vehicle=name)
     heavy = dataclasses.replace(load_vehicle("vis_r"), mass=13.0)
-    with pytest.raises(ValueError, match=r"mass of vehicle 'vis_r' is 13; accepted: 0.025 to 12 kg"):
+    with pytest.raises(ValueError, match=r"mass of vehicle 'vis_r' is 13 kg; accepted: 0.025 to 12 kg"):
         e2efly.load_policy(trained / "policy.onnx", vehicle=heavy)
 
 
@@ -212,7 +212,7 @@ def test_plants_and_the_bridge_take_one_vehicle(
     slow.write_text(vehicle_file("vis_r").read_text().replace("value = 0.060\n", "value = 0.2\n"))
     for options, said in (
         ((), "--vehicle is left out; accepted: a name or .toml file, as the policy flies any vehicle within"),
-        (("--vehicle", str(slow)), "latency of vehicle 'slow' is 0.2; accepted: 0 to 0.12 s"),
+        (("--vehicle", str(slow)), "latency of vehicle 'slow' is 0.2 s; accepted: 0 to 0.12 s"),
     ):
         assert run(["fly", str(trained), *options, "--link", "tcp:127.0.0.1:9"]) == 2
         assert said in " ".join(capsys.readouterr().err.split())

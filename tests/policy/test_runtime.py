@@ -31,6 +31,7 @@ from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import Route, course_for, fields_of
 from e2efly.tasks.track.goal import TrackRoute
 from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle_domain import drawn_domain
 from tests.policy.made import made
 
 VEHICLE = load_vehicle("vis_r")
@@ -257,8 +258,16 @@ def _field(contract: Contract, name: str, /, **changes: Any) -> Contract:
     return dataclasses.replace(contract, observation=tuple(fields))
 
 
+LIGHT = drawn_domain(dataclasses.replace(VEHICLE, name="light", mass=0.6, rotor_thrust_max=4.1), "ctbr", {"mass": 0.1})
 REFUSED: list[tuple[Callable[[Contract], Contract], str]] = [
-    (lambda c: dataclasses.replace(c, vehicle_hash="0" * 16), "vehicle 'vis_r' has hash .*; accepted: 0000"),
+    (
+        lambda c: dataclasses.replace(c, vehicle_hash="0" * 16, vehicles=None),
+        "vehicle 'vis_r' has hash .*; accepted: 0000",
+    ),
+    (
+        lambda c: dataclasses.replace(c, vehicle_hash="0" * 16, vehicles=LIGHT),
+        "mass of vehicle 'vis_r' is 0.75 kg, 25 % more than the 0.6 kg of 'vis_r'; accepted: 0.54 to 0.66 kg",
+    ),
     (lambda c: dataclasses.replace(c, control_rate_hz=100.0), "control_rate is 30.0 Hz; accepted: 100 Hz"),
     (
         lambda c: dataclasses.replace(c, action=dataclasses.replace(c.action, mode="rotor_thrust")),
@@ -297,9 +306,7 @@ def test_what_cannot_fly_is_refused_by_name(
 def test_all_reasons_are_given_at_once(policy: Policy) -> None:
     goal, config = course_for(policy.contract, VEHICLE), presets.preset("race", "ppo")
     race = course_for(contract_of(Env.of(config.task, config.reward, config.env), config), VEHICLE)
-    with pytest.raises(
-        ValueError, match=r"vehicle 'vis_h' has hash(.|\n)*control_rate is 50(.|\n)*envelope.tilt is -1"
-    ):
+    with pytest.raises(ValueError, match=r"mass of vehicle 'vis_h'(.|\n)*control_rate is 50(.|\n)*envelope.tilt is -1"):
         Runtime.of(policy, goal, load_vehicle("vis_h"), 50.0, envelope=Envelope(tilt=-1.0))
     with pytest.raises(ValueError, match=r"observation shows .*; accepted: with gates, as its task is 'hover'"):
         Runtime.of(policy, race, VEHICLE)

@@ -96,13 +96,15 @@ def test_a_task_is_the_name_of_its_policy(tmp_path: Path) -> None:
         ("mine.toml", "crazyflie", "crazyflie"),  # its values under another name
         ("crazyflie.toml", "vis_h", "vis_h"),  # values go before the name
         ("crazyflie.toml", None, "crazyflie"),
-        ("heavy.toml", None, USUAL),
+        ("heavy.toml", None, USUAL),  # of the nearest mass
     ):
         text = vehicle_file(values or USUAL).read_text()
         (tmp_path / own).write_text(text if values else text.replace("value = 0.75\n", "value = 0.8\n", 1))
         assert policy_file("hover", tmp_path / own) == FOLDER / whose / "hover.onnx"
-    # by sight there is the usual vehicle's alone: it flies every file, and no other shipped vehicle
+    # by sight there is none of that name: the mass decides
     assert policy_file("avoid", tmp_path / "crazyflie.toml") == FOLDER / USUAL / "avoid.onnx"
+    (tmp_path / "light.toml").write_text(vehicle_file(USUAL).read_text().replace("value = 0.75\n", "value = 0.5\n", 1))
+    assert policy_file("avoid", tmp_path / "light.toml") == FOLDER / "vis_h" / "avoid.onnx"
     with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_r'"):
         policy_file("hover", "vis_x")
     assert beside(FOLDER / USUAL / "hover.onnx") == Path("runs/zoo-hover-vis_r")
@@ -129,7 +131,7 @@ def test_a_policy_is_loaded_by_what_the_command_line_takes(tmp_path: Path) -> No
     for name in ("hover", str(file), tmp_path, tmp_path / "policy.onnx"):
         assert e2efly.load_policy(name).contract.vehicle == "vis_r"
     assert e2efly.load_policy("hover", vehicle="crazyflie").contract.vehicle == "crazyflie"
-    with pytest.raises(ValueError, match=r"vehicle 'crazyflie' has hash .*, that of 'vis_r'"):
+    with pytest.raises(ValueError, match=r"mass of vehicle 'crazyflie' is 0.027 kg, 96 % less than .*; accepted: 0.56"):
         e2efly.load_policy(file, vehicle="crazyflie")
 
 

@@ -66,12 +66,12 @@ def test_the_shipped_vehicles_are_of_any() -> None:
 @pytest.mark.parametrize(
     ("field", "factor", "said"),
     [
-        ("mass", 20.0, "mass of vehicle 'vis_r' is 15; accepted: 0.025 to 12 kg"),
-        ("rotor_position", 6.0, "arm of vehicle 'vis_r' is 0.45; accepted: 0.03 to 0.4 m"),
-        ("motor_time_constant", 4.0, "motor_time_constant of vehicle 'vis_r' is 0.14; accepted: 0.015 to 0.1 s"),
-        ("rate_gain", 0.2, "rate_gain of vehicle 'vis_r' is 5; accepted: 8 to 120 1/s"),
-        ("latency", 3.0, "latency of vehicle 'vis_r' is 0.18; accepted: 0 to 0.12 s"),
-        ("body_rate_max", 0.4, "roll_rate_max of vehicle 'vis_r' is 4; accepted: 5 to 12 rad/s"),
+        ("mass", 20.0, "mass of vehicle 'vis_r' is 15 kg; accepted: 0.025 to 12 kg"),
+        ("rotor_position", 6.0, "arm of vehicle 'vis_r' is 0.45 m; accepted: 0.03 to 0.4 m"),
+        ("motor_time_constant", 4.0, "motor_time_constant of vehicle 'vis_r' is 0.14 s; accepted: 0.015 to 0.1 s"),
+        ("rate_gain", 0.2, "rate_gain of vehicle 'vis_r' is 5 1/s; accepted: 8 to 120 1/s"),
+        ("latency", 3.0, "latency of vehicle 'vis_r' is 0.18 s; accepted: 0 to 0.12 s"),
+        ("body_rate_max", 0.4, "roll_rate_max of vehicle 'vis_r' is 4 rad/s; accepted: 5 rad/s or more"),
         ("thrust_map", 0.5, "thrust_to_weight of vehicle 'vis_r' is 1.959; accepted: 2 to 6"),
     ],
 )

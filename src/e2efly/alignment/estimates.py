@@ -23,6 +23,18 @@ class Estimate:
     """Origin of the estimate: the file and the estimator."""
 
 
+def weighed(mass: tuple[float, float]) -> Estimate:
+    """The mass of a vehicle by a scale: kg, and the standard deviation of the scale.
+
+    Raises:
+        ValueError: for numbers that are not positive, as the option `--mass`.
+    """
+    kg, sigma = mass
+    if not (kg > 0 and sigma > 0):
+        raise ValueError(f"--mass is {kg} {sigma}; accepted: kg and its standard deviation, both above 0")
+    return Estimate("mass", np.array(kg), np.array(sigma), "weighed")
+
+
 class ContradictionError(ValueError):
     """The values of two sources cannot both be true."""
 

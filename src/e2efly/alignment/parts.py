@@ -136,16 +136,21 @@ def _add(
     return m.sum(0), centre, inertias + steiner
 
 
-def estimates(path: Path) -> list[Estimate]:
+def estimates(path: Path, centre: bool = False) -> list[Estimate]:
     """Mass and inertia of a vehicle from its list of parts.
+
+    With `centre`, also its centre of mass forward and left of the list's origin, which must be the middle between the
+    rotors. Its height is left at 0: where the drag acts is not known.
 
     Raises:
         ValueError: as for `read_parts`.
     """
     found, source = prototype(read_parts(path)), f"{path.name}, parts list"
+    placed = Estimate("centre_of_mass", found.centre * [1.0, 1.0, 0.0], np.full(3, np.nan), source)
     return [
         Estimate("mass", np.array(found.mass), np.array(found.mass_sigma), source),
         Estimate("inertia", np.diag(found.inertia), np.diag(found.inertia_sigma), source),
+        *([placed] if centre else []),
     ]
 
 

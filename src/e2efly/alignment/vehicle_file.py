@@ -55,7 +55,7 @@ def write_vehicle(
         "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
     ]
     for f in quantities(vehicle):
-        entry: dict[str, Any] = table[f.name]
+        entry: dict[str, Any] = table.get(f.name, {"unit": f.metadata["unit"]})  # a term that the base does not have
         lines += ["", f"[{f.name}]", f"value = {_toml(getattr(vehicle, f.name))}", f"unit = {_text(entry['unit'])}"]
         if f.name in found:
             lines += [f"sigma = {_toml(found[f.name].sigma, digits=3)}", f"source = {_text(found[f.name].source)}"]

@@ -30,7 +30,7 @@ class Eval:
 
     policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
-    has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
+    has that vehicle, otherwise of the nearest mass. `any/hover` is the policy for any vehicle."""
     episodes: int = 1000
     """Number of starts per criterion."""
     json: Path | None = None

@@ -195,7 +195,7 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
-        for line in goal_notes(loaded.contract, options.goal):
+        for line in (*loaded.contract.differences(body), *goal_notes(loaded.contract, options.goal)):
             console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:

@@ -68,7 +68,7 @@ def run(options: Identify) -> int:
 def _identify(options: Identify) -> int:
     from e2efly.alignment import parts, pendulum, stand, stand_file
     from e2efly.alignment.correlation import correlation
-    from e2efly.alignment.estimates import Estimate, fuse
+    from e2efly.alignment.estimates import fuse, weighed
     from e2efly.alignment.vehicle_file import merged, write_vehicle
     from e2efly.logs import csv_file
 
@@ -81,10 +81,7 @@ def _identify(options: Identify) -> int:
     base, reading = load_vehicle(options.vehicle), options.read.reading(used)
     said: list[Estimate] = []
     if options.mass:
-        mass, sigma = options.mass
-        if not (mass > 0 and sigma > 0):
-            raise ValueError(f"--mass is {mass} {sigma}; accepted: kg and its standard deviation, both above 0")
-        said.append(Estimate("mass", np.array(mass), np.array(sigma), "weighed"))
+        said.append(weighed(options.mass))
     for kind, estimates in (("parts", parts.estimates), ("pendulum", pendulum.estimates)):
         for path in files[kind]:
             said += estimates(path)

@@ -35,7 +35,7 @@ class Validate:
 
     policy: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="POLICY")]]
     """A run directory, a policy.onnx, or a task. A task selects its policy in the zoo: the one for --vehicle if the zoo
-    has that vehicle, otherwise the one for VIS-R. `any/hover` is the policy for any vehicle."""
+    has that vehicle, otherwise of the nearest mass. `any/hover` is the policy for any vehicle."""
     plant: str = "mujoco"
     """The plant that flies: simulator (our own, with the bridge's runtime), mujoco, betaflight (the real firmware with
     our rigid-body model), airsim:HOST:PORT (a running AirSim), or your own plant, path/to/plant.py:Name."""
@@ -192,7 +192,7 @@ def _folder(o: Validate, flew: "Candidate") -> Path:
 
 
 def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
-    """Fly whole flights, if the plant is the firmware and the vehicle is the policy's. Returns whether all were
+    """Fly whole flights, if the plant is the firmware and the policy flies the vehicle. Returns whether all were
     complete.
     """
     from e2efly.commands.rehearsals import flights_table, fly_whole

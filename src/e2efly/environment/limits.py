@@ -1,12 +1,16 @@
 """Limits of the commands, and delays, that follow from a configuration and its vehicle."""
 
+from typing import Any
+
 import numpy as np
 
 from e2efly.config import EnvConfig
+from e2efly.config.domain import Domain
 from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.vehicles.family import Family
-from e2efly.vehicles.posterior import IDENTIFIED, WIDEST, Posterior, load_posterior
+from e2efly.vehicles.posterior import ADDED, IDENTIFIED, TOGETHER, WIDEST, Posterior, load_posterior
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_domain import drawn_domain
 
 MOST = 10.0
 """Largest factor on the standard deviations of an identified vehicle from which episodes may draw."""
@@ -39,6 +43,26 @@ def latencies_of(
     sooner, later = config.latency_spread
     margin = 0.0 if posterior is None else WIDEST * float(posterior.latency_sigma)
     return max(low - sooner - margin, 0.0), high + later + margin
+
+
+def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None) -> Domain:
+    """The ranges of the vehicles that episodes draw about one vehicle, for the contract of a policy.
+
+    A posterior counts up to its widest draws. They are in the logarithm; the range has their lower, narrower side on
+    both sides. What an episode's disturbances take of the thrust is no property of the vehicle, and stays a reserve.
+    """
+    shares: dict[str, Any] = {name: width for name, width in config.randomize.items() if name != IDENTIFIED}
+    entries = () if posterior is None else zip(posterior.entries, posterior.sigma.values(), strict=True)
+    for entry, sigma in entries:
+        if entry.field in ADDED:
+            continue
+        share = -np.expm1(-WIDEST * sigma)
+        for name in (entry.field, *TOGETHER.get(entry.field, ())):
+            own = np.shape(getattr(vehicle, name))
+            each = np.array(shares.get(name, np.zeros(own)), np.float64)
+            each[... if entry.index is None else entry.index] = share
+            shares[name] = each
+    return drawn_domain(vehicle, config.command_mode, shares, float(config.disturbance.centre_of_mass))
 
 
 def posterior_of(config: EnvConfig) -> Posterior | None:

@@ -13,7 +13,7 @@ from e2efly.config import TrainConfig
 from e2efly.config.storage import write_atomically
 from e2efly.control import COMMAND_MODES
 from e2efly.environment import Env
-from e2efly.environment.limits import limits_of
+from e2efly.environment.limits import limits_of, posterior_of, vehicles_of
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.learning.onnx_layers import policy_graph
 from e2efly.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
@@ -66,6 +66,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         vehicle=vehicle.name,
         vehicle_hash=vehicle.hash if family is None else None,
         vehicle_ranges=None if family is None else family.ranges,
+        vehicles=None if family is not None else vehicles_of(about, vehicle, posterior_of(about)),
         control_rate_hz=float(rate),
         latency_s=float(vehicle.latency) if latency[0] <= vehicle.latency <= latency[1] else sum(latency) / 2,
         latency_range_s=latency,

@@ -19,9 +19,11 @@ from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
 from e2efly.policy.observation import PAST_ACTIONS, Field, Own, own_fields
+from e2efly.policy.zoo import contents
 from e2efly.vehicles.family import Ranges
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_domain import differences, misfits, vehicle_domain
 
 CONTRACT_VERSION = 2
 """Version of the meaning of these fields; a policy of another version is refused."""
@@ -37,6 +39,8 @@ ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
 """Mapping from an action to a physical command, entry by entry."""
 RATES = (0.1, 10_000.0)
 """Smallest and largest control rate, Hz."""
+OPTIONAL = ("vehicles", "courses")
+"""Fields that a contract may leave out: ranges that its training did not declare."""
 FRAMES = ("world", "body", "world_body", "none")
 """Frames of an observation field."""
 
@@ -114,6 +118,9 @@ class Contract:
     vehicle_ranges: Ranges | None = None
     """Ranges of the vehicles that it flies, for a family. None, and no JSON key, for a single vehicle, identified by
     the hash."""
+    vehicles: Domain | None = None
+    """For a single vehicle: the ranges of the vehicles that it was trained for, which lie about that vehicle
+    (`e2efly.vehicles.vehicle_domain`). None, and no JSON key: not declared, or a family's."""
     courses: Domain | None = None
     """Ranges of the courses and worlds that it was trained for. None, and no JSON key: not declared."""
 
@@ -126,23 +133,58 @@ class Contract:
     def refusals(self, vehicle: Vehicle | None = None, control_rate: float | None = None) -> tuple[str, ...]:
         """The reasons why the policy does not fly a (loaded) vehicle at a rate, Hz, in words. Empty: it does.
 
-        It flies the vehicle that it was trained on, or all vehicles within its ranges, with the delays of its training.
-        What is None is not compared.
+        It flies the vehicle that it was trained on, and all vehicles within the ranges of its training, with the
+        delays of its training. What is None is not compared.
         """
-        rate, reasons = self.control_rate_hz, list[str]()
-        if vehicle is None:
-            pass
-        elif self.vehicle_ranges is not None:
-            late = self.latency_range_s
-            reasons += dataclasses.replace(self.vehicle_ranges, latency=(late[0], late[1])).outside(vehicle)
-        elif vehicle.hash != self.vehicle_hash:
-            reasons.append(
-                f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
-                f"{self.vehicle!r} as the policy was trained on it: load that one, or train the policy again"
+        rate, reasons = self.control_rate_hz, list(() if vehicle is None else self.misfits(vehicle))
+        if vehicle is not None and reasons:
+            other = f"any/{self.task}" if not self.of_family and self.task in contents().get("any", {}) else ""
+            reasons[-1] += (
+                f"; what flies it is a policy that is trained for it, by `e2efly train {self.task} --vehicle FILE`"
+                f"{f', or that of any vehicle, {other}' if other else ''}"
             )
         if control_rate is not None and not abs(control_rate - rate) <= 1e-6 * rate:  # true for NaN
             reasons.append(f"control_rate is {control_rate} Hz; accepted: {rate:g} Hz, at which the policy was trained")
         return tuple(reasons)
+
+    def misfits(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """The quantities in which a vehicle lies outside of what the policy was trained for, in words."""
+        if vehicle.hash == self.vehicle_hash:
+            return ()
+        if not self.domain:
+            return (
+                f"vehicle {vehicle.name!r} has hash {vehicle.hash}; accepted: {self.vehicle_hash}, that of "
+                f"{self.vehicle!r} as the policy was trained on it",
+            )
+        delay = Extent("latency", "s", *self.latency_range_s)
+        trained = *(part for part in self.domain if part.name != delay.name), delay
+        return misfits(trained, self._measured(vehicle), vehicle.name, "" if self.of_family else self.vehicle)
+
+    def differences(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """By how much a vehicle differs from the one that the policy was trained about, in words: a text for each
+        quantity. Empty: it is that vehicle, or there is none, as for a family.
+        """
+        if self.of_family or vehicle.hash == self.vehicle_hash:
+            return ()
+        own = Extent("latency", "s", self.latency_s, self.latency_s)
+        return differences((*self.domain, own), self._measured(vehicle), self.vehicle)
+
+    @property
+    def of_family(self) -> bool:
+        """Whether it was trained for a family of vehicles rather than about a single one."""
+        return self.vehicle_hash is None
+
+    @property
+    def domain(self) -> Domain:
+        """The ranges of the vehicles that it was trained for, without the delay. Empty: not declared."""
+        return (self.vehicles or ()) if self.vehicle_ranges is None else self.vehicle_ranges.domain
+
+    def _measured(self, vehicle: Vehicle) -> Domain:
+        """The quantities of a vehicle that its ranges are of, with its delay."""
+        if self.vehicle_ranges is not None:
+            return self.vehicle_ranges.domain_of(vehicle)
+        late = float(vehicle.latency)
+        return (*vehicle_domain(vehicle, self.action.mode), Extent("latency", "s", late, late))
 
     def latency_of(self, vehicle: Vehicle) -> float:
         """Latency from observation to command with which a vehicle flies, s. A vehicle of a family has its own."""
@@ -187,7 +229,7 @@ class Contract:
             ValueError: for a contract that `from_json` would refuse.
         """
         left_out = {"vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"}
-        left_out |= {"courses"} if self.courses is None else set()
+        left_out |= {name for name in OPTIONAL if getattr(self, name) is None}
         content = {key: value for key, value in dataclasses.asdict(self).items() if key not in left_out}
         text = json.dumps(content, indent=2)
         Contract.from_json(text)
@@ -214,7 +256,9 @@ class Contract:
             absent = "vehicle_hash" if "vehicle_ranges" in content else "vehicle_ranges"
             if absent in content:
                 raise read.refusal(absent, content[absent], "one of vehicle_hash and vehicle_ranges, not both")
-            content = {"courses": None} | content | {absent: None}
+            content = dict.fromkeys(OPTIONAL) | content | {absent: None}
+            if absent == "vehicle_hash" and content["vehicles"] is not None:
+                raise read.refusal("vehicles", content["vehicles"], "left out, as vehicle_ranges say it")
         return _contract(read.table(content, "", Contract))
 
 
@@ -248,16 +292,16 @@ def _contract(x: dict[str, Any]) -> Contract:
         action=_action(x["action"]),
         hover_action=hover,
         vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
-        courses=None if x["courses"] is None else _courses(x["courses"]),
+        **{name: None if x[name] is None else _domain(x[name], name) for name in OPTIONAL},
     )
 
 
-def _courses(value: Any) -> Domain:
+def _domain(value: Any, field: str) -> Domain:
     if not isinstance(value, list):
-        raise read.refusal("courses", value, "a list of ranges, empty for a goal that is one place")
+        raise read.refusal(field, value, "a list of ranges")
     found = []
     for i, entry in enumerate(value):
-        where = f"courses[{i}]"
+        where = f"{field}[{i}]"
         x = read.table(entry, where, Extent)
         name, unit = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit"))
         low, high = (read.number(x[key], f"{where}.{key}") for key in ("low", "high"))

@@ -162,6 +162,9 @@ class Candidate:
             notes.append(
                 f"What flies is {self.vehicle}, by the policy of a {contract.vehicle}; the flight controller {told}."
             )
+            body = load_vehicle(self.vehicle)
+            notes += [f"Outside of the training: {text}." for text in contract.misfits(body)]
+            notes += [] if contract.misfits(body) else [f"{text}." for text in contract.differences(body)]
         if self.changes:
             changes = (f"{name} {value} (not {own})" for name, (own, value) in self.changes.items())
             notes.append(f"Flown under {', '.join(changes)}.")

@@ -16,10 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.config.domain import Domain, Extent
 from e2efly.config.tables import read_table
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import FAMILIES, OF_FAMILIES, load_vehicle, read_values, vehicle_file
 from e2efly.vehicles.vehicle import Vehicle, quantities
+from e2efly.vehicles.vehicle_domain import misfits
 
 DRAWN = 20
 """Number of uniform random numbers that define a vehicle."""
@@ -35,8 +37,6 @@ _RINGING = 4.0
 _AIR = 1.225
 """Density of air, kg/m^3: the standard atmosphere at sea level."""
 _SPIN = (1.0, -1.0, -1.0, 1.0)
-_BESIDE = 1e-6
-"""Relative rounding error within which a number still counts as inside its range."""
 
 
 def _range(unit: str, at_least: float | None = None, above: float | None = None, high: float = math.inf) -> Any:
@@ -110,18 +110,20 @@ class Ranges:
                 "rate loop rings"
             )
 
+    @property
+    def domain(self) -> Domain:
+        """The ranges of what a vehicle file has: all but the control rate, which belongs to the policy."""
+        known = [f for f in dataclasses.fields(self) if f.name != "control_rate"]
+        return tuple(Extent(f.name, f.metadata["unit"], *getattr(self, f.name)) for f in known)
+
     def outside(self, vehicle: Vehicle) -> tuple[str, ...]:
         """The quantities in which a vehicle lies outside the ranges, as text: quantity, value and what is accepted."""
-        found = []
-        for known in dataclasses.fields(self):
-            low, high = getattr(self, known.name)
-            for value in measured(vehicle).get(known.name, ()):
-                value = min(value, high) if known.name.endswith("rate_max") else value
-                if not low * (1 - _BESIDE) <= value <= high * (1 + _BESIDE):
-                    accepted = f"{low:g} to {high:g} {known.metadata['unit']}".removesuffix(" 1")
-                    found.append(f"{known.name} of vehicle {vehicle.name!r} is {value:.4g}; accepted: {accepted}")
-                    break
-        return tuple(found)
+        return misfits(self.domain, self.domain_of(vehicle), vehicle.name)
+
+    def domain_of(self, vehicle: Vehicle) -> Domain:
+        """The quantities of these ranges that a loaded vehicle has."""
+        values = measured(vehicle)
+        return tuple(Extent(x.name, x.unit, min(values[x.name]), max(values[x.name])) for x in self.domain)
 
 
 def measured(vehicle: Vehicle) -> dict[str, tuple[float, ...]]:

@@ -146,16 +146,17 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
     lines = [f"#define {big}_{key} {value}" for key, value in words.items()]
     lines += [f"#define {big}_{key} {number(value)} {comment(about)}" for key, (value, about) in numbers.items()]
     lines += [f"#define {big}_{key} {value} {comment(about)}" for key, (value, about) in counts.items()]
-    if c.vehicle_ranges is not None:
-        lines.append(comment(f"It flies any vehicle of the family {c.vehicle} within these ranges, in SI units:"))
-        for key, (least, most) in vars(c.vehicle_ranges).items():
-            lines.append(f"#define {big}_VEHICLE_{key.upper()}_MIN {number(least)}")
-            lines.append(f"#define {big}_VEHICLE_{key.upper()}_MAX {number(most)}")
-    if c.courses:
-        lines.append(comment("The courses and worlds that it was trained for, in SI units:"))
-        for part in c.courses:
-            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MIN {number(part.low)}")
-            lines.append(f"#define {big}_COURSE_{part.name.upper()}_MAX {number(part.high)}")
+    if c.domain:
+        those = f"any vehicle of the family {c.vehicle}" if c.of_family else f"{c.vehicle} and vehicles about it,"
+        lines.append(comment(f"It flies {those} within these ranges, in SI units:"))
+    for kind, domain, about in (
+        ("VEHICLE", c.domain, ""),
+        ("COURSE", c.courses or (), "The courses and worlds that it was trained for, in SI units:"),
+    ):
+        lines += [comment(about)] if domain and about else []
+        for part in domain:
+            lines.append(f"#define {big}_{kind}_{part.name.upper()}_MIN {number(part.low)}")
+            lines.append(f"#define {big}_{kind}_{part.name.upper()}_MAX {number(part.high)}")
     return "\n".join(lines) + "\n"
 
 

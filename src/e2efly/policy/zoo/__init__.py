@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def policy_file(policy: str | os.PathLike[str], vehicle: str | Path | None = Non
         policy: a policy.onnx, a run directory (its policy.onnx), the name of a task (the zoo's policy of it), or a
             vehicle of the zoo and a task, as in `any/hover`, whatever flies.
         vehicle: whose policy, of the zoo's: a shipped name, or a file: that of the shipped vehicle with the same
-            values, or else of the same name, and of `USUAL` for any other file, and when left out.
+            values, or else of the same name, or else of the nearest mass. When left out: `USUAL`.
 
     Raises:
         ValueError: for what is no policy, with all names; when the zoo's file is not what zoo.json says.
@@ -112,9 +113,10 @@ def _whose(body: Path, having: list[str]) -> str:
     if body.parent in (vehicle_file(USUAL).parent, FAMILIES) or load_family(body) is not None:
         return body.stem
     having = [name for name in having if load_family(name) is None]
-    found = load_vehicle(body).hash
-    same = [name for name in having if load_vehicle(name).hash == found]
-    return next((name for name in (*same, body.stem) if name in having), USUAL)
+    own, known = load_vehicle(body), {name: load_vehicle(name) for name in having}
+    same = [name for name, vehicle in known.items() if vehicle.hash == own.hash]
+    near = sorted(known, key=lambda name: abs(math.log(known[name].mass / own.mass)))
+    return next((name for name in (*same, body.stem, *near) if name in having), USUAL)
 
 
 def beside(policy: Path) -> Path:
