@@ -59,8 +59,8 @@ VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
 USUAL_ALONE = tuple(VARIANTS)
 """For the usual vehicle alone."""
-SEEING = (USUAL, "vis_h")
-"""Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds."""
+SEEING = (USUAL, "vis_h", presets.FAMILY)
+"""Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
 SEEN = 250
 """Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5

@@ -142,6 +142,7 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     else:
         lines.append("| under stress | not measured row by row |")
     lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
+    lines += [f"| camera {image.name} | {image.mount} |" for image in load_policy(policy).contract.images]
     if courses := load_policy(policy).contract.courses:
         lines.append(f"| trained for | {', '.join(map(str, courses))} |")
     trained = made_by(f"train {kind}{options}{preset} --seed {about['seed']}", configured(policy))

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.fly_check import add_lags, mount, print_settings, print_table
+from e2efly.commands.fly_check import add_lags, print_settings, print_table
 from e2efly.flight.betaflight import messages, settings_by_name
 from e2efly.flight.betaflight.allowed_modes import ANGLE
 from e2efly.flight.betaflight.client import MESSAGES, Client
@@ -244,12 +244,3 @@ def test_the_report_says_how_late_the_velocities_are(
     assert ("estimated from the poses, 32 ms later" in said) == (given is None)
     assert "body rate" in said and "estimated from the poses, 11 ms later" in said
     assert "states 0 to 20 ms old, and 50 ms from observation to command" in said
-
-
-def test_the_report_says_where_the_camera_of_the_training_is() -> None:
-    (camera,) = load_policy(policy_file(Path("race_clutter"))).contract.images
-    turned = replace(camera, position_m=(0.1, -0.02, 0.03), pitch_rad=-0.35, fov_rad=(1.5, 1.0))
-    assert mount(turned) == (
-        "0.100 m before, -0.020 m left of and 0.030 m above the centre of mass, pitched up by 20.1 deg, "
-        "field of view 85.9 x 57.3 deg (pinhole)"
-    )

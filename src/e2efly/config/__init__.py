@@ -14,6 +14,7 @@ from e2efly.config.algorithms import (
     SHACConfig,
 )
 from e2efly.config.env import (
+    AHEAD,
     D435I,
     CameraConfig,
     DisturbanceConfig,
@@ -35,6 +36,7 @@ from e2efly.config.run import (
 )
 
 __all__ = [
+    "AHEAD",
     "ALGORITHMS",
     "CLUTTER",
     "D435I",

@@ -32,7 +32,7 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
     if lacking := [image for image in contract.images if image.name not in chosen]:
         image = lacking[0]
         raise ValueError(
-            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
+            f"image {image.name!r}: there is no camera, and the policy was trained with one ({image.mount}); "
             f"accepted: --image {image.name}=URI, with URI {forms()}"
         )
     cameras: list[ImageSource] = []
