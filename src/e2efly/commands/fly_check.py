@@ -85,7 +85,7 @@ def look(
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses)
     add_lags(table, bridge, poses, contract)
-    _add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
+    add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot
@@ -164,7 +164,8 @@ def _milliseconds(span: Sequence[float]) -> str:
     return f"{low} ms" if low == high else f"{low} to {high} ms"
 
 
-def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
+def add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
+    """What each camera of a policy shows, and how the camera of its training was mounted."""
     now = time.monotonic()
     for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
         table.add_row("image", _cell(_image(camera, seen, now, rate)))
