@@ -164,7 +164,7 @@ def test_images_of_a_contract_agree_with_each_other_and_with_the_rate() -> None:
 
 def test_no_camera_no_flight(path: Path, policy: Policy) -> None:
     """Refused before anything is opened."""
-    message = r"image 'image_0' \(depth, 2 rows, 4 columns\): there is no camera; accepted: "
+    message = r"image 'image_0': there is no camera.*looks straight ahead.*4 x 2 pixels of depth.*; accepted: "
     goal = course_for(policy.contract, VEHICLE)
     with pytest.raises(ValueError, match=message):
         Runtime.of(policy, goal, VEHICLE)

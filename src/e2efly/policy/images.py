@@ -89,6 +89,11 @@ class Image:
         )
 
     @property
+    def lacking(self) -> str:
+        """The beginning of the error of whoever has no camera for it."""
+        return f"image {self.name!r}: there is no camera, and the policy was trained with one ({self.mount})"
+
+    @property
     def limits(self) -> tuple[float, float]:
         """Smallest and largest value."""
         if self.sees in ("depth", "range"):
