@@ -48,6 +48,7 @@ from e2efly.learning.onnx_export import write_policy
 from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import is_sealed
 from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
+from e2efly.runs import presets
 from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
@@ -59,8 +60,8 @@ VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
 USUAL_ALONE = tuple(VARIANTS)
 """For the usual vehicle alone."""
-SEEING = (USUAL, "vis_h")
-"""Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds."""
+SEEING = (USUAL, "vis_h", presets.FAMILY)
+"""Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
 SEEN = 250
 """Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5

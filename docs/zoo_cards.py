@@ -85,11 +85,10 @@ def limits(about: dict[str, Any]) -> list[str]:
 
 
 def flies_by(policy: Policy) -> str:
-    """What a policy needs, in words."""
+    """What a policy needs beside its cameras, in words."""
     contract = policy.contract
-    seen = [f"{image.height} x {image.width} pixels of {image.sees}" for image in contract.images]
     memory = f"a memory of {contract.memory_size} numbers" if contract.memory_size else "no memory"
-    return ", ".join([f"{contract.control_rate_hz:g} commands per second", memory, *seen])
+    return f"{contract.control_rate_hz:g} commands per second, {memory}"
 
 
 def configured(policy: Path) -> TrainConfig:
@@ -142,6 +141,7 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     else:
         lines.append("| under stress | not measured row by row |")
     lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
+    lines += [f"| camera {image.name} | {image.mount} |" for image in load_policy(policy).contract.images]
     if courses := load_policy(policy).contract.courses:
         lines.append(f"| trained for | {', '.join(map(str, courses))} |")
     trained = made_by(f"train {kind}{options}{preset} --seed {about['seed']}", configured(policy))

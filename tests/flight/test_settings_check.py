@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.fly_check import add_lags, mount, print_settings, print_table
+from e2efly.commands.fly_check import add_images, add_lags, print_settings, print_table
 from e2efly.flight.betaflight import messages, settings_by_name
 from e2efly.flight.betaflight.allowed_modes import ANGLE
 from e2efly.flight.betaflight.client import MESSAGES, Client
@@ -25,6 +25,7 @@ from e2efly.flight.betaflight.settings_messages import RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, sticks_of
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.settings import FlightSettings
+from e2efly.flight.sight.quality import SeenImages
 from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Sample
 from e2efly.policy.zoo import policy_file
@@ -246,10 +247,13 @@ def test_the_report_says_how_late_the_velocities_are(
     assert "states 0 to 20 ms old, and 50 ms from observation to command" in said
 
 
-def test_the_report_says_where_the_camera_of_the_training_is() -> None:
+def test_the_report_says_how_the_camera_of_the_training_was_mounted(capsys: pytest.CaptureFixture[str]) -> None:
     (camera,) = load_policy(policy_file(Path("race_clutter"))).contract.images
-    turned = replace(camera, position_m=(0.1, -0.02, 0.03), pitch_rad=-0.35, fov_rad=(1.5, 1.0))
-    assert mount(turned) == (
-        "0.100 m before, -0.020 m left of and 0.030 m above the centre of mass, pitched up by 20.1 deg, "
-        "field of view 85.9 x 57.3 deg (pinhole)"
-    )
+    source = SimpleNamespace(describe=lambda: "shm:front")
+    table = Table(box=None)
+    bridge: Any = SimpleNamespace(cameras=[source], seen=[SeenImages(camera)])
+    add_images(table, bridge, [30.0], None)
+    print_table(Console(width=30), table)
+    said = capsys.readouterr().out
+    assert f"trained with a camera: {camera.mount}" in said
+    assert "tilted 20 degrees up" in said

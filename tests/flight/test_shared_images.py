@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=said):
             open_cameras(texts, CONTRACT)
 
-    refused([], r"image 'image_0' \(depth, 12 rows, 32 columns\): there is no camera; accepted: --image image_0=URI")
+    refused([], "image 'image_0': there is no camera.*tilted 20 degrees up.*32 x 12 pix.*accepted: --image image_0=URI")
     refused(["front=shm:x"], "--image is 'front=shm:x'; accepted: NAME=URI, NAME one of image_0")
     refused(["image_0"], "--image is 'image_0'; accepted")
     refused(["image_0=shm:x", "image_0=shm:y"], "image_0 is 'shm:x' and 'shm:y'; accepted: one URI for each image")

@@ -20,6 +20,7 @@ from e2efly.policy.loader import level_and_still
 from e2efly.runs import presets
 from e2efly.simulation import device
 from e2efly.simulation.physics import Physics, step
+from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import act_of
 from e2efly.validation.stress import stress
 from e2efly.vehicles.family import Family, _loaded, load_family
@@ -110,6 +111,14 @@ def test_a_new_episode_has_another_vehicle_and_delay() -> None:
     assert state.family is not None
     assert np.all(np.asarray(state.family) != np.asarray(first.family))
     assert np.all(np.asarray(state.action_latency) != np.asarray(first.action_latency))
+
+
+def test_a_family_sees_by_the_cameras_of_one_vehicle() -> None:
+    for task in (task for task, known in TASKS.items() if known.cameras and known.family):
+        one, many = (presets.starting(task, "bptt", "robust", vehicle).env for vehicle in (None, "any"))
+        assert many.cameras == one.cameras != ()
+        assert many.wind == presets.BESIDE_FAMILY.wind
+    assert presets.starting("land_visual", "bptt", "robust", "any").env.vehicle == "any"
 
 
 def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:

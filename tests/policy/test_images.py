@@ -50,6 +50,27 @@ def policy(path: Path) -> Policy:
     return load_policy(path)
 
 
+@pytest.mark.parametrize(
+    ("pitch", "said"),
+    [
+        (-0.35, "tilted 20 degrees up"),
+        (0.2, "tilted 11 degrees down"),
+        (-0.001, "looks straight ahead"),
+        (np.pi / 2, "looks straight down"),
+        (-np.pi / 2, "looks straight up"),
+        (2.0, "tilted 115 degrees down"),
+    ],
+)
+def test_a_mount_is_told_in_words(policy: Policy, pitch: float, said: str) -> None:
+    image = policy.contract.images[0]
+    told = dataclasses.replace(image, pitch_rad=pitch, latency_range_s=(0.0, 0.05)).mount
+    assert told == (
+        f"{said}; in the centre of mass; 87 x 58 degrees (pinhole), 4 x 2 pixels of depth; 30 Hz, 0 to 50 ms old"
+    )
+    elsewhere = dataclasses.replace(image, position_m=(0.1, -0.02, 0.03)).mount
+    assert "; +10.0 cm ahead, -2.0 cm left and +3.0 cm above; " in elsewhere
+
+
 def images(n: int | None = None) -> list[np.ndarray]:
     lead = () if n is None else (n,)
     return [np.full((*lead, 2, 4), 2.0), np.full((*lead, 2, 2, 3), 0.5)]
@@ -143,7 +164,7 @@ def test_images_of_a_contract_agree_with_each_other_and_with_the_rate() -> None:
 
 def test_no_camera_no_flight(path: Path, policy: Policy) -> None:
     """Refused before anything is opened."""
-    message = r"image 'image_0' \(depth, 2 rows, 4 columns\): there is no camera; accepted: "
+    message = r"image 'image_0': there is no camera.*looks straight ahead.*4 x 2 pixels of depth.*; accepted: "
     goal = course_for(policy.contract, VEHICLE)
     with pytest.raises(ValueError, match=message):
         Runtime.of(policy, goal, VEHICLE)

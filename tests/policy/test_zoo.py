@@ -1,6 +1,7 @@
 """The policy zoo: every policy does what is said of it."""
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 import e2efly
 from e2efly.commands.cli import run
+from e2efly.config import AHEAD
 from e2efly.environment import episodes
 from e2efly.environment.stress_rows import rows_for
 from e2efly.learning.onnx_export import contract_of
@@ -52,6 +54,18 @@ def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> 
     file = policy_file(task, vehicle)
     config = from_json(json.loads(config_file(file).read_text()), "")
     assert contract_of(Setup.of(config).env, config) == evaluation.load_policy(file).contract
+
+
+def test_a_vehicle_has_one_mount_for_all_that_look_ahead_and_the_builder_is_told_it() -> None:
+    """Of tasks as of policies: the camera that a builder mounts serves each."""
+    recipes = {(camera.pitch, camera.position) for task in TASKS.values() for camera in task.cameras}
+    assert recipes == {(AHEAD.pitch, AHEAD.position), (math.pi / 2, AHEAD.position)}
+    built = (FOLDER.parents[3] / "docs" / "hardware.md").read_text(encoding="utf-8")
+    mounted = [(vehicle, task) for vehicle, task in POLICIES if vehicle != "vis_h"]  # which sees rendered images
+    for vehicle, task in mounted:
+        for image in evaluation.load_policy(policy_file(task, vehicle)).contract.images:
+            assert any(np.isclose(image.pitch_rad, pitch) for pitch, _ in recipes)
+            assert f"| {task} | {image.mount} |" in built
 
 
 @pytest.mark.whole

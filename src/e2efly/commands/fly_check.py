@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from math import degrees
 from pathlib import Path
 
 from rich.console import Console
@@ -23,7 +22,6 @@ from e2efly.flight.sight.picture import blocks, colours, sheet, write_png
 from e2efly.flight.sight.quality import SeenImages
 from e2efly.flight.sight.samples import read_samples
 from e2efly.policy.contract import Contract
-from e2efly.policy.images import Image
 from e2efly.policy.odometry import Sample
 
 WIDEST = 10_000
@@ -87,7 +85,7 @@ def look(
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses)
     add_lags(table, bridge, poses, contract)
-    _add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
+    add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot
@@ -166,11 +164,12 @@ def _milliseconds(span: Sequence[float]) -> str:
     return f"{low} ms" if low == high else f"{low} to {high} ms"
 
 
-def _add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
+def add_images(table: Table, bridge: Bridge, rates: list[float], policy: Path | None) -> None:
+    """What each camera of a policy shows, and how the camera of its training was mounted."""
     now = time.monotonic()
     for camera, seen, rate in zip(bridge.cameras, bridge.seen, rates, strict=True):
         table.add_row("image", _cell(_image(camera, seen, now, rate)))
-        table.add_row("", _cell(f"made for a camera {mount(seen.camera)}"))
+        table.add_row("", _cell(f"trained with a camera: {seen.camera.mount}"))
         if seen.frame is not None:
             pixels, path = colours(seen.frame.image, seen.camera), PICTURES / f"check_{seen.camera.name}.png"
             trained = None if policy is None else read_samples(policy, seen.camera)
@@ -192,17 +191,6 @@ def _image(camera: ImageSource, seen: SeenImages, now: float, rate: float) -> st
     trained = f"{age:.0f} ms old (trained with {ages}), {rate:.0f} Hz ({seen.camera.rate_hz:g})"
     note = f"; {camera.problem}" if camera.problem else ""
     return f"{seen.camera.name} from {camera.describe()}: {values}; {trained}{note}"
-
-
-def mount(camera: Image) -> str:
-    """Where the camera of the policy's training is, how it is turned, and how much it sees, in words."""
-    x, y, z = camera.position_m
-    wide, high = map(degrees, camera.fov_rad)
-    turned = f"pitched {'up' if camera.pitch_rad < 0 else 'down'} by {abs(degrees(camera.pitch_rad)):.1f} deg"
-    return (
-        f"{x:.3f} m before, {y:.3f} m left of and {z:.3f} m above the centre of mass, {turned}, "
-        f"field of view {wide:.1f} x {high:.1f} deg ({camera.projection})"
-    )
 
 
 def _commands(commander: Commander, bridge: Bridge) -> str:

@@ -14,6 +14,7 @@ from e2efly.config.algorithms import (
     SHACConfig,
 )
 from e2efly.config.env import (
+    AHEAD,
     D435I,
     CameraConfig,
     DisturbanceConfig,
@@ -36,6 +37,7 @@ from e2efly.config.run import (
 )
 
 __all__ = [
+    "AHEAD",
     "ALGORITHMS",
     "CLUTTER",
     "D435I",

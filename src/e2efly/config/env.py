@@ -1,5 +1,6 @@
 """Options of the environment: the vehicle, its sensors, and their random variation."""
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -145,6 +146,9 @@ class CameraConfig:
 
 D435I = CameraConfig(fov=(math.radians(87), math.radians(58)), reach=(0.28, 10.0))
 """Depth camera of an Intel RealSense D435i."""
+AHEAD = dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), pitch=-0.35)
+"""The same on a vehicle, as every task that looks ahead has it: tilted 20 degrees up, because a vehicle that flies fast
+leans forwards. A vehicle has one mount, so there is one pitch."""
 
 
 FILE, RANDOM = "vehicle of the file", "random vehicles"

@@ -67,6 +67,33 @@ class Image:
         return (self.height, self.width, *((3,) if self.sees in _COLOURS else ()))
 
     @property
+    def tilt(self) -> str:
+        """Where the camera looks, in words, to whole degrees."""
+        up = round(-math.degrees(self.pitch_rad))
+        if abs(up) in (0, 90):
+            return {0: "looks straight ahead", 90: "looks straight up", -90: "looks straight down"}[up]
+        return f"tilted {abs(up)} degrees {'up' if up > 0 else 'down'}"
+
+    @property
+    def mount(self) -> str:
+        """The camera that a policy was trained with, in words, for whoever builds the vehicle: how it is turned, where
+        it is on the body, how much it sees, its pixels and the age of its images.
+        """
+        across, down = (f"{math.degrees(angle):.0f}" for angle in self.fov_rad)
+        x, y, z = (f"{100 * way:+.1f}" for way in self.position_m)
+        place = f"{x} cm ahead, {y} cm left and {z} cm above" if any(self.position_m) else "in the centre of mass"
+        low, high = (f"{1e3 * age:.0f}" for age in self.latency_range_s)
+        return (
+            f"{self.tilt}; {place}; {across} x {down} degrees ({self.projection}), {self.width} x {self.height} pixels "
+            f"of {self.sees}; {self.rate_hz:g} Hz, {low} to {high} ms old"
+        )
+
+    @property
+    def lacking(self) -> str:
+        """The beginning of the error of whoever has no camera for it."""
+        return f"image {self.name!r}: there is no camera, and the policy was trained with one ({self.mount})"
+
+    @property
     def limits(self) -> tuple[float, float]:
         """Smallest and largest value."""
         if self.sees in ("depth", "range"):

@@ -192,10 +192,7 @@ def check(
             "which become collective thrust and body rates"
         )
     for image in contract.images if not images else ():
-        reasons.append(
-            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
-            "accepted: a policy without images (from Python, `Policy.act` takes them)"
-        )
+        reasons.append(f"{image.lacking}; accepted: a policy without images (from Python, `Policy.act` takes them)")
     own = own_fields(imu=True, actions=max(contract.past_actions, 1))
     known = {field.name: field for field in (*shown, *(row.field for row in own))}
     sensed = {row.field.name for row in own if row.source == "imu"}

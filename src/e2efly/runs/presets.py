@@ -217,7 +217,8 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
                 f"--vehicle is {vehicle}, a family; accepted by preset 'robust' for {_having('family')}; not for "
                 f"{config.task.name} by {config.algo.name}"
             )
-        return given.into(dataclasses.replace(config, env=dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle)))
+        env = dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle, cameras=env.cameras)
+        return given.into(dataclasses.replace(config, env=env))
     if robust:
         margin = load_vehicle(vehicle).thrust_to_weight
         shares = (_narrower(percent / 100) for percent in range(100, -1, -1))

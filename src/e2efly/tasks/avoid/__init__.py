@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import (
-    D435I,
+    AHEAD,
     AlgorithmConfig,
     BPTTConfig,
     EnvConfig,
     ForestConfig,
     Given,
-    ImageNoiseConfig,
     NetworkConfig,
     Paper,
     PPOConfig,
@@ -39,7 +38,7 @@ class AvoidConfig(TaskConfig):
     best: ClassVar = "bptt"
     precision: ClassVar = "pace"
     robust: ClassVar = {"bptt": Robust(steps=4_500_000, chunk=150, recurrent=96, hidden=(128, 64))}
-    cameras: ClassVar = (dataclasses.replace(D435I, noise=ImageNoiseConfig(d435i=True), width=32, height=12),)
+    cameras: ClassVar = (dataclasses.replace(AHEAD, width=32, height=12),)
     curriculum: ClassVar = (
         StageConfig({"forest.density": 0.0, "speed": (2.0, 4.0)}, success=0.9, steps=1_000_000),
         StageConfig({"forest.density": 0.03, "speed": (2.0, 5.0)}, success=0.8, steps=2_000_000),

@@ -39,6 +39,9 @@ class LandVisualConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.land_visual.goal:LandVisualRoute"
     best: ClassVar = "bptt"
     robust: ClassVar = {"bptt": Robust(steps=2_000_000, hidden=(128, 64))}
+    family: ClassVar = {
+        "bptt": Robust(algo={"horizon": 96, "average": 0.99}, steps=6_000_000, chunk=60, hidden=(128, 64))
+    }
     cameras: ClassVar = (CameraConfig("mask", 16, 16, fov=(math.pi / 2, math.pi / 2), pitch=math.pi / 2),)
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "ori2": 0.003, "vz": 0.1, "anglev": 0.001},

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from e2efly.config import (
-    D435I,
+    AHEAD,
     AlgorithmConfig,
     BPTTConfig,
     CameraConfig,
@@ -51,11 +51,7 @@ class RaceClutterConfig(TaskConfig):
     best: ClassVar = "bptt"
     precision: ClassVar = "duration"
     robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
-    cameras: ClassVar = (
-        dataclasses.replace(
-            D435I, noise=ImageNoiseConfig(d435i=True), width=48, height=24, pitch=-0.35, noise_share=0.5
-        ),
-    )
+    cameras: ClassVar = (dataclasses.replace(AHEAD, width=48, height=24, noise_share=0.5),)
     curriculum: ClassVar = (
         StageConfig({"clutter.obstacles": 0.0}, success=0.8, steps=2_000_000),
         StageConfig({"clutter.obstacles": 5.0}, success=0.7, steps=2_000_000),

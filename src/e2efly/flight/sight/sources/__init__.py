@@ -31,10 +31,7 @@ def open_cameras(texts: Sequence[str], contract: Contract) -> list[ImageSource]:
     chosen = by_image(texts, contract)
     if lacking := [image for image in contract.images if image.name not in chosen]:
         image = lacking[0]
-        raise ValueError(
-            f"image {image.name!r} ({image.sees}, {image.height} rows, {image.width} columns): there is no camera; "
-            f"accepted: --image {image.name}=URI, with URI {forms()}"
-        )
+        raise ValueError(f"{image.lacking}; accepted: --image {image.name}=URI, with URI {forms()}")
     cameras: list[ImageSource] = []
     try:
         for image in contract.images:
