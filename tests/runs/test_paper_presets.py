@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,11 +13,12 @@ from e2efly.config.changes import differing
 from e2efly.environment import Env
 from e2efly.policy.goal import Shape
 from e2efly.runs import presets
-from e2efly.runs.inputs import to_json
+from e2efly.runs.inputs import fingerprint, to_json
 from e2efly.runs.paper import AUTHORS, SILENT
 from e2efly.tasks import TASKS
 from e2efly.tasks.task import make_task
 
+RESULTS = Path(__file__).parents[2] / "benchmarks" / "results"
 HAVING = [name for name, task in TASKS.items() if task.paper is not None]
 SIZES = {"hover": 13, "land": 13, "track": 40, "race": 16, "land_visual": 13, "race_clutter": 17}
 """Numbers of the paper's observations, images not counted."""
@@ -92,3 +94,15 @@ def test_tracking_pays_for_its_goal_where_the_time_is_over() -> None:
         _, outcome = task.advance(memory, on_it, on_it, jnp.full(1, 5.0), jnp.full(1, over))
         assert bool(outcome.arrived[0]) is over
     np.testing.assert_allclose(outcome.error, 0.0, atol=1e-6)
+
+
+def test_a_fingerprint_leaves_out_an_added_field_only_while_it_says_what_was_done_before() -> None:
+    config = dataclasses.replace(presets.preset("land", "ppo"), stop_at=0.99)
+    recorded = json.loads((RESULTS / "time_to_criterion.json").read_text())["runs"]
+    known = {run["configuration"] for run in recorded if run["command"].startswith("train land --algo ppo")}
+    assert fingerprint(config) in known
+    for task, algo in (({"must_touch": False}, {}), ({}, {"decay": "linear"})):
+        other = dataclasses.replace(
+            config, task=dataclasses.replace(config.task, **task), algo=dataclasses.replace(config.algo, **algo)
+        )
+        assert fingerprint(other) not in known

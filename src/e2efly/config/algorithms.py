@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeVar
 
-from e2efly.config.numbers import check_fields, number
+from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.registry import Registry
 
 
@@ -83,7 +83,7 @@ class _Annealed(AlgorithmConfig):
     """Learning rate of Adam at the start."""
     learning_rate_end: float = number(1e-4, above=0, high=1.0)
     """Learning rate of Adam at the end."""
-    decay: Literal["exponential", "linear"] = "exponential"
+    decay: Literal["exponential", "linear"] = shape("exponential", added=True)
     """How the learning rate changes in between (sets the program)."""
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, cast, get_args, get_origin
 
 from e2efly.config.tables import LARGEST, shown
 
-RULE, SHAPE = "rule", "sets_shapes"
+RULE, SHAPE, ADDED = "rule", "sets_shapes", "added"
 """Keys of a field's metadata."""
 SMALLEST = 1e-9
 """By how much a number must be larger than the end that its rule excludes. Products of such numbers are not 0 in
@@ -68,9 +68,13 @@ def number(
     return dataclasses.field(default=default, metadata={RULE: rule})
 
 
-def shape(default: Any) -> Any:
-    """A field, with its default, that determines which program is compiled."""
-    return dataclasses.field(default=default, metadata={SHAPE: True})
+def shape(default: Any, *, added: bool = False) -> Any:
+    """A field, with its default, that determines which program is compiled.
+
+    `added`: an older version did not have the field, and did what the default does. A fingerprint of a configuration
+    (`e2efly.runs.inputs.fingerprint`) leaves it out while it has its default.
+    """
+    return dataclasses.field(default=default, metadata={SHAPE: True, ADDED: added})
 
 
 def check_fields(prefix: str, part: Any) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.config import ALGORITHMS, TrainConfig
+from e2efly.config.numbers import ADDED
 from e2efly.config.reading import read
 from e2efly.courses.tracks import track_file
 from e2efly.runs.presets import preset
@@ -171,9 +172,20 @@ def fingerprint(config: TrainConfig) -> str:
     Raises:
         ValueError: when a file of the configuration cannot be read.
     """
-    told = to_json(by_content(dataclasses.replace(config, seed=0, devices=None)))
-    criteria = {name: dataclasses.asdict(suite) for name, suite in config.task.criteria().items()}
+    content = by_content(dataclasses.replace(config, seed=0, devices=None))
+    told = {**to_json(config), **_defining(content)}
+    criteria = {name: _defining(suite) for name, suite in config.task.criteria().items()}
     return sha256(json.dumps([told, criteria], sort_keys=True).encode())[:12]
+
+
+def _defining(part: Any) -> Any:
+    """`dataclasses.asdict` without the fields that were added later and say what was done before."""
+    if isinstance(part, tuple):
+        return [_defining(x) for x in part]
+    if not dataclasses.is_dataclass(part):
+        return part
+    there = ((f, getattr(part, f.name)) for f in dataclasses.fields(part))
+    return {f.name: _defining(x) for f, x in there if not (f.metadata.get(ADDED) and x == f.default)}
 
 
 def from_json(content: dict[str, Any], where: str) -> TrainConfig:

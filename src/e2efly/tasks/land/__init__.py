@@ -16,6 +16,7 @@ from e2efly.config import (
     TaskConfig,
     TrainConfig,
     number,
+    shape,
 )
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import INK, ORANGE, Face, Line, Thing, circle
@@ -98,7 +99,7 @@ class LandConfig(TaskConfig):
     """Success: largest speed at touchdown, m/s."""
     tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
-    must_touch: bool = True
+    must_touch: bool = shape(True, added=True)
     """Success: whether the vehicle has to touch. Without it, being as near, as slow and as upright is enough."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""

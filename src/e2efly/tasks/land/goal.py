@@ -87,12 +87,12 @@ def touchdown(config: Any, body: Any, goal: Array, touched: Array) -> Outcome:
     offset = body.position - goal
     sideways = xp.linalg.norm(offset[:, :2], axis=-1)
     success = (
-        (touched | (config.must_touch < 1))
-        & (sideways < config.radius)
+        (sideways < config.radius)
         & (xp.abs(offset[:, 2]) < config.height_error)
         & (xp.linalg.norm(body.velocity, axis=-1) < config.speed)
         & upright(body, config.tilt)
     )
+    success = success & touched if config.must_touch else success
     lost = (sideways > config.fence) | (offset[:, 2] > config.fence)
     return Outcome(
         terminated=touched | lost | success, success=success, arrived=success, crashed=(touched & ~success) | lost,

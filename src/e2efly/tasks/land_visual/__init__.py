@@ -76,11 +76,11 @@ class LandVisualConfig(TaskConfig):
     """Success: largest speed at touchdown, m/s."""
     tilt: float = number(0.2617993877991494, high=ANGLE)
     """Success: largest tilt at touchdown, rad."""
-    must_touch: bool = True
+    must_touch: bool = shape(True, added=True)
     """Success: whether the vehicle has to touch. Without it, being as near, as slow and as upright is enough."""
     fence: float = number(defaults.LAND_FENCE, above=0, endless=True)
     """The episode fails farther than this from the pad, sideways or upwards, m."""
-    shows_position: bool = shape(False)
+    shows_position: bool = shape(False, added=True)
     """Whether the policy sees where the pad is, and not only the height. With it, its observation beside the image is
     that of the paper's table: 13 numbers, with env.past_actions 0."""
 

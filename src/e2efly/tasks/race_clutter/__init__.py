@@ -102,7 +102,7 @@ class RaceClutterConfig(TaskConfig):
     """The episode fails farther than this from the next gate, m."""
     collisions_end: bool = True
     """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
-    shows_axes: bool = shape(True)
+    shows_axes: bool = shape(True, added=True)
     """Whether the policy sees in which direction the next two gates are flown through. Without it, its observation is
     the paper's: 17 numbers, with env.past_actions 0."""
 
