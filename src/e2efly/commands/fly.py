@@ -32,6 +32,7 @@ from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
 from e2efly.flight.log_record import Log, Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
+from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
@@ -195,7 +196,8 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, options.goal)
-        for line in goal_notes(loaded.contract, options.goal):
+        check_course(settings.fence, course)
+        for line in (f"The course needs {course.needs}.", *goal_notes(loaded.contract, options.goal)):
             console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:

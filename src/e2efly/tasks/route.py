@@ -1,9 +1,12 @@
 """Where a policy is to fly: options of `e2efly fly`, and the course that follows from them. Imports no JAX."""
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+
+import numpy as np
 
 from e2efly.config import TaskConfig, check_fields, number
 from e2efly.config.domain import Domain
@@ -143,7 +146,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
     if not route.outside and (reasons := contract.outside(route.domain())):
         raise ValueError("\n".join([*(f"goal: {reason}" for reason in reasons), ANYWAY]))
     least = vehicle.feet_height if course.clearance is None else course.clearance
-    height = course.lowest + placed.origin.position[2]
+    height = float(placed.origin.points(np.reshape(course.points, (-1, 3)))[:, 2].min(initial=math.inf))
     if height < least:
         raise ValueError(
             f"goal.{route.height}: its lowest point is {height:.3f} m over the ground of the room, with goal.origin; "

@@ -135,6 +135,6 @@ class RaceRoute(Route):
         return dataclasses.replace(RaceConfig(), laps=self.laps)
 
     def _placed(self, goal: Racing, memory: Any, track: RaceTrack) -> Course:
-        lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         start = track.start.astype(np.float32).astype(np.float64)
-        return Course(goal, memory, start, heading=float(track.start_yaw), lowest=lowest, clearance=0.0)
+        heading = float(track.start_yaw)
+        return Course(goal, memory, start, heading=heading, points=track.corners, clearance=0.0)

@@ -141,8 +141,7 @@ class RaceClutterRoute(Route):
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
         track = load_track(self.track).enlarged(self.scale)
         memory = ClutterMemory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
-        lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
         return Course(
             RaceClutterGoal(config, shape, control_period, 1), memory,
-            np.asarray(track.start, np.float64), heading=float(track.start_yaw), lowest=lowest, clearance=0.0,
+            np.asarray(track.start, np.float64), heading=float(track.start_yaw), points=track.corners, clearance=0.0,
         )  # fmt: skip
