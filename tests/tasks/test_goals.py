@@ -318,7 +318,7 @@ def test_gates_are_judged_as_in_training(contracts: dict[str, Contract], name: s
     [
         ("hover", {"target": (0.0, np.nan, 1.0)}, r"goal\.target is \(0.0, nan, 1.0\); accepted: 3 numbers, -1"),
         ("hover", {"target": (0.0, 0.0, 0.0)}, r"goal\.target: its lowest point is 0.000 m"),
-        ("hover", {"origin": (0.0, 0.0, -3.5)}, r"goal\.target: its lowest point is -0.500 m"),
+        ("hover", {"origin": (0.0, 0.0, -1.7)}, r"goal\.target: its lowest point is -0.500 m"),
         ("track", {"reference": "circel"}, "unknown reference 'circel'; did you mean 'circle'"),
         ("track", {"reference": "polynomial"}, "unknown reference 'polynomial'.*or the path of a .csv file"),
         ("track", {"reference": "nowhere.csv"}, "reference 'nowhere.csv' cannot be read"),

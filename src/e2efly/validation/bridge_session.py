@@ -191,5 +191,6 @@ def rehearsal_settings(height: float, reach: float = REACH, fence: Fence | None 
     """
     wide = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
     return dataclasses.replace(
-        FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True, fence=fence or wide,
+        FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True,
+        fence=fence or wide,
     )  # fmt: skip
