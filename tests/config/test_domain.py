@@ -10,9 +10,9 @@ import pytest
 
 from e2efly.config import TaskConfig
 from e2efly.config.domain import Domain, Extent, outside, track_domain, union
+from e2efly.courses.defaults import ROOMS
 from e2efly.courses.gates import Tracks
 from e2efly.courses.random_tracks import CANDIDATES, DOMAIN, NUMBERS, random_tracks
-from e2efly.courses.defaults import ROOMS
 from e2efly.courses.tracks import RaceTrack, load_track, track_names
 from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Shape

@@ -162,7 +162,7 @@ class _Prepared:
 
 
 def _chosen(options: Fly, console: Terminal) -> tuple[Path | None, Route | None]:
-    """The file of the policy, and where it flies. For a policy of the zoo, the options may need that of another task."""
+    """The file of the policy, and where it flies. The options may need the zoo's policy of another task."""
     if options.policy is None:
         return None, options.goal
     file = policy_file(options.policy, options.vehicle)

@@ -47,7 +47,7 @@ class Route:
 
     @property
     def instead(self) -> str | None:
-        """The task whose policy of the zoo flies these options in place of this task's policy, if it is not this one."""
+        """The task whose policy of the zoo flies these options. None: this task."""
         return None
 
     @property

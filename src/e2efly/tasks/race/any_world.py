@@ -107,8 +107,8 @@ def several(names: tuple[str, ...], scale: float = 1.0) -> Tracks:
     """Tracks with enlarged ground plans, one in each world, in arrays for as many gates as the longest has.
 
     Raises:
-        ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, and for a name
-            given twice.
+        ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, and for a
+            name given twice.
     """
     if isinstance(names, str) or not names:
         raise ValueError(f"task.track is {names!r}; accepted: a tuple of one or more tracks")

@@ -55,8 +55,8 @@ class RaceClutter(RaceClutterGoal):
         """Load the tracks.
 
         Raises:
-            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that is
-                not among them.
+            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
+                is not among them.
         """
         given = several(config.track, config.scale)
         count = len(config.track)

@@ -17,7 +17,6 @@ from e2efly.tasks.race.any_goal import COMMANDED, AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.goal import GatesRoute
 from e2efly.tasks.race_speed import RaceSpeedConfig
 
-
 SLOW = 3.0
 """Speed of a flight for which none is given, m/s."""
 
