@@ -30,3 +30,7 @@ TRACK_FENCE = 3.0
 """An episode fails farther than this from the reference, m."""
 RACE_FENCE = 10.0
 """An episode fails farther than this from the next gate, m."""
+TRACKS = ("room_4", "room_6", "room_10", "four_gates", "circle_3d", "s_shaped", "j_shaped")
+"""The tracks on which policies learn to race at a commanded speed."""
+ROOMS = {"room_4": (4.0, 2.5), "room_6": (6.0, 2.5), "room_10": (10.0, 3.0)}
+"""Side and height of the room that a track is made for, m. The room is square, and the track's origin is its middle."""

@@ -48,6 +48,16 @@ class Route:
     outside: bool = False
     """Fly a course also if it lies outside of the ranges that the policy was trained for."""
 
+    @property
+    def instead(self) -> str | None:
+        """The task whose policy of the zoo flies these options. None: this task."""
+        return None
+
+    @property
+    def notes(self) -> list[str]:
+        """What is to be said of the options before every flight."""
+        return []
+
     def domain(self) -> Domain:
         """The quantities of the course, named as in `TaskConfig.domain`."""
         return ()
@@ -156,10 +166,11 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
 
 
 def goal_notes(contract: Contract, route: Route | None) -> list[str]:
-    """What is to be said of a course that is flown although the policy was not, or may not be, trained for it."""
+    """What is to be said of a course: of its options, and if the policy was not, or may not be, trained for it."""
+    route = route_of(contract)() if route is None else route
     if contract.courses is None:
-        return [UNDECLARED]
-    return [f"Outside of the training: {text}." for text in contract.outside(() if route is None else route.domain())]
+        return [*route.notes, UNDECLARED]
+    return [*route.notes, *(f"Outside of the training: {text}." for text in contract.outside(route.domain()))]
 
 
 def _check_use(contract: Contract, route: Route) -> None:

@@ -1,13 +1,14 @@
 """Racing on any track: the goal of policies whose observation describes the gates fully. Imports no JAX."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import STRAIGHT_ON, Tracks
-from e2efly.policy.goal import Outcome, Shape
+from e2efly.policy.goal import Observed, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.racing import Racing
@@ -21,16 +22,25 @@ HIGHEST = 3.0
 
 @dataclass(frozen=True)
 class AnyRaceMemory:
-    """The track of each vehicle, and the number of gates that it has passed."""
+    """The track of each vehicle, the number of gates that it has passed, and its commanded speed."""
 
     tracks: Tracks
     passed: Array
     """(n,) gates passed."""
+    speed: Array | float = math.inf
+    """(n,) commanded speed, m/s. Infinite: as fast as it can."""
 
     @property
     def index(self) -> Array:
         """(n,) the next gate, counted from 0 within a lap."""
         return self.passed % self.tracks.count
+
+
+COMMANDED: Observed = (
+    Field("desired_speed", 1, "none", "m/s", 8.0, "speed to fly at"),
+    lambda goal, memory, time, body: memory.speed[:, None],
+)
+"""The commanded speed, for policies that obey one."""
 
 
 @dataclass(frozen=True)
