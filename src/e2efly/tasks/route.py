@@ -31,7 +31,7 @@ def place(default: Any) -> Any:
 
 @dataclass(frozen=True)
 class Route:
-    """Where a policy is to fly. The defaults are those of the training."""
+    """Where a policy is to fly. The defaults fit into a room where the task has such a course."""
 
     longest_s: ClassVar[float] = 10.0
     """Longest flight of the policy in a rehearsal, s."""
@@ -39,6 +39,8 @@ class Route:
     """Name of the option that sets the height of the course."""
     whole: ClassVar[dict[str, Any]] = {}
     """Options of a rehearsal that replace the defaults."""
+    trained: ClassVar[dict[str, Any]] = {}
+    """Options that place the course of the training, where the defaults place another."""
 
     origin: tuple[float, float, float] = place((0.0, 0.0, 0.0))
     """Position of the task's origin in the room (the world of the pose source), m."""
@@ -104,6 +106,12 @@ def route_of(contract: Contract) -> type[Route]:
     return route
 
 
+def usual_route(contract: Contract) -> Route:
+    """The route that a policy flies unless another is given."""
+    kind, fixed = route_of(contract), COMMAND_MODES[contract.action.mode].fixed
+    return kind(**{name: value for name, value in kind.trained.items() if name in fixed})
+
+
 def goal_of(task: type[TaskConfig]) -> type[Goal]:
     """The class that computes a policy's task observation and judges it.
 
@@ -135,16 +143,16 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
-    """The course that a policy was trained to fly, at the place that the options give.
+    """The course that a policy is to fly, at the place that the options give.
 
-    Without a route, it is where the training was. The vehicle matters by its feet height and its size.
+    Without a route, it is the usual one. The vehicle matters by its feet height and its size.
 
     Raises:
         ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,
             a goal under the ground, a course that does not exist or is broken, or that the policy was not trained for.
     """
     kind = route_of(contract)
-    route = kind() if route is None else route
+    route = usual_route(contract) if route is None else route
     if not isinstance(route, kind):
         raise ValueError(f"goal is a {type(route).__name__}; accepted: a {kind.__name__}, for task {contract.task!r}")
     check_fields("goal", route)
@@ -167,7 +175,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
 
 def goal_notes(contract: Contract, route: Route | None) -> list[str]:
     """What is to be said of a course: of its options, and if the policy was not, or may not be, trained for it."""
-    route = route_of(contract)() if route is None else route
+    route = usual_route(contract) if route is None else route
     if contract.courses is None:
         return [*route.notes, UNDECLARED]
     return [*route.notes, *(f"Outside of the training: {text}." for text in contract.outside(route.domain()))]
@@ -184,9 +192,9 @@ def _check_use(contract: Contract, route: Route) -> None:
     # a policy knows its position only relative to its goal: commands in world axes refer to the world of its training
     mode = contract.action.mode
     for name in COMMAND_MODES[mode].fixed:
-        if name in changed:
-            default = type(route).__dataclass_fields__[name].default
+        value, default = (getattr(x, name, None) for x in (route, usual_route(contract)))
+        if value != default:
             raise ValueError(
-                f"goal.{name} is {changed[name]!r}; accepted: {default!r}, as the policy commands {mode} in the world "
+                f"goal.{name} is {value!r}; accepted: {default!r}, as the policy commands {mode} in the world "
                 "of its training: give the pose source that origin instead"
             )

@@ -16,7 +16,7 @@ from e2efly.flight.settings import Fence
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.runtime import Acting, RuntimeState
-from e2efly.tasks.route import Route, course_for, route_of
+from e2efly.tasks.route import Route, course_for, route_of, usual_route
 from e2efly.validation.bridge_session import REACH, FlownSession, Session, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
@@ -68,8 +68,8 @@ class Rehearsal:
 
 def whole_course(policy: Acting, vehicle: Vehicle, route: Route | None = None) -> Course:
     """The course of a policy in a rehearsal. Without a route, the usual one of its task, wherever it was trained."""
-    kind = route_of(policy.contract)
-    return course_for(policy.contract, vehicle, route or kind(outside=True, **kind.whole))
+    usual = usual_route(policy.contract)
+    return course_for(policy.contract, vehicle, route or dataclasses.replace(usual, outside=True, **usual.whole))
 
 
 def rehearse(

@@ -68,6 +68,7 @@ class HoverRoute(Route):
     """Where to hover."""
 
     longest_s: ClassVar = 8.0
+    trained: ClassVar = {"target": defaults.TARGET}
 
     target: tuple[float, float, float] = place((0.0, 0.0, defaults.FLOWN_HEIGHT))
     """Point to hover at, m."""

@@ -127,6 +127,7 @@ class HoverAwareRoute(Route):
     """Where to hover, and what to look at."""
 
     longest_s: ClassVar = 8.0
+    trained: ClassVar = {"target": defaults.TARGET}
 
     target: tuple[float, float, float] = place((0.0, 0.0, defaults.FLOWN_HEIGHT))
     """Point to hover at, m."""

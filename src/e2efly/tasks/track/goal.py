@@ -123,6 +123,7 @@ class TrackRoute(Route):
 
     height: ClassVar = "reference"
     longest_s: ClassVar = 12.0
+    trained: ClassVar = {"centre": defaults.CENTRE}
 
     reference: str = "circle"
     """circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
