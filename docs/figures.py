@@ -58,6 +58,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
+    "room_flights": "The paper's six tasks through real Betaflight firmware, in a room of 6x6 m",
     "controllers": "Hover controllers, and where learning pays",
     "filter": "The filter of `fly --guard filter`: flights against it, and what it costs",
     "plants_by_sight": "Policies that see, on plants that render",
@@ -81,7 +82,8 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "fault_campaign", "onboard",
+            "room_flights", "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal",
+            "fault_campaign", "onboard",
             "c_export",
         ),
         ZOO,
@@ -104,7 +106,7 @@ POLICIES = {
 """The policies of each table: presets by which they were trained, the zoo's, or none."""
 SCRIPTS = {
     "identify_betaflight": "identify.py --plant betaflight", "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
-    "zoo_stress_by_sight": "zoo_stress.py --by-sight",
+    "zoo_stress_by_sight": "zoo_stress.py --by-sight", "room_flights": "firmware_flights.py --room",
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
 FIRST = """
@@ -194,6 +196,11 @@ seeds of avoid on the nominal vehicle, with 1000 unseen forests each, succeed at
 99.7 / 99.3 / 98.7, 99.8 / 98.9 / 97.7 and 99.4 / 98.8 / 98.4 %. They fly the 40 m from a standing start
 in 9.1, 7.5 and 7.7 s, which is 87, 67 and 52 % of the commanded speed. The first seed was trained in
 273 s.""",
+    "room_flights": """
+The fence is 5.6 x 5.6 x 2.7 m, 0.2 m before the walls; it would end a policy's flight before the vehicle
+leaves it. *Flown space*: the box of all true positions of the five flights, from take-off to landing. The races
+fly three laps of `room_6`, and the fastest is told the highest of 8, 7, 6, 5 and 4 m/s at which all five
+flights succeed. The others fly what `e2efly fly` flies without further options.""",
     "firmware_flights": """
 The zoo's policies of VIS-R, as they ship, in all nine tasks. Success is the task's own verdict,
 by the code that judges training. All policies are by the preset `robust`. What the last three see is
