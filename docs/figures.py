@@ -64,6 +64,7 @@ TITLES = {
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",
     "hil_rehearsal": "Hardware in the loop, rehearsed in real time",
+    "hil_room": "Hardware in the loop, rehearsed in a room of 6x6 m",
     "pad_masks": "Masks by the package's network, of rendered pads that it never saw",
     "firmware_faults": "Faults injected into flights of the real firmware",
     "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
@@ -82,7 +83,7 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "room_flights", "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal",
+            "room_flights", "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "hil_room",
             "fault_campaign", "onboard",
             "c_export",
         ),
@@ -106,6 +107,7 @@ POLICIES = {
 """The policies of each table: presets by which they were trained, the zoo's, or none."""
 SCRIPTS = {
     "identify_betaflight": "identify.py --plant betaflight", "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
+    "hil_room": "hil_rehearsal.py --room",
     "zoo_stress_by_sight": "zoo_stress.py --by-sight", "room_flights": "firmware_flights.py --room",
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
@@ -174,6 +176,10 @@ The zoo's race_clutter of VIS-H, commanded to fly at 4 to 6 m/s, with a radio of
 the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware are processes in real time on
 two cores. Times are the median / 99 % of the worst lap. In the second table each process is killed once
 in flight. [How the rehearsal works](hil.md#rehearse-it-first).""",
+    "hil_room": """
+The zoo's race_clutter_room of VIS-R, as above, in the fence of the room in which [whole
+flights](#the-papers-six-tasks-through-real-betaflight-firmware-in-a-room-of-6x6-m) are flown. Other programs
+ran on the same two cores. [A small room](hil.md#a-small-room).""",
     "identify_betaflight": """
 Each log has 30 s of `e2efly fly excitation`, in a fence of 12 x 12 x 4.8 m, flown by the bridge through
 Betaflight 4.6 in virtual time. The true delay is measured by the rig's own clock: the age of the poses, and
