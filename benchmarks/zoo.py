@@ -59,9 +59,10 @@ from e2efly.vehicles.loading import vehicle_names
 VARIANTS = {
     "race_any": ("race", "any_track", ""),
     "race_clutter_room": ("race_clutter", "robust",
-        "--from race_clutter --task.track room_6 --task.scale 1 --task.speed 1.5 4 --task.episode-s 15 "
-        "--task.gate-position 0.2 --task.clutter.sideways 1.5 --task.clutter.size 0.1 0.3 --task.clutter.clear 0.4 "
-        "--steps 1840000 --algo.learning-rate 1.5e-3",
+        "--from race_clutter --task.track room_6 room_4 room_10 s_shaped circle_3d j_shaped --task.only 0 "
+        "--task.scale 1 --task.speed 1 2.5 --task.episode-s 15 --task.gate-position 0.2 --task.clutter.sideways 1.5 "
+        "--task.clutter.size 0.1 0.3 --task.clutter.clear 0.4 --steps 6000000 --eval-episodes 20 "
+        "--algo.learning-rate 3e-3",
     ),
 }  # fmt: skip
 """Policies of a task by a preset of its own, or by other options: task, preset and options of `train`."""

@@ -87,11 +87,12 @@ class RaceClutterConfig(TaskConfig):
         return cls(laps=0, collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Each track, with one lap or the requested number of laps. Collisions end the episode."""
+        """Each track that is used, with one lap or the requested number of laps. Collisions end the episode."""
         judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)
         if len(self.track) == 1:
             return {self.name: judged}
-        return {Path(track).stem: dataclasses.replace(judged, only=float(i)) for i, track in enumerate(self.track)}
+        used = range(len(self.track)) if self.only < 0 else [int(self.only)]
+        return {Path(self.track[i]).stem: dataclasses.replace(judged, only=float(i)) for i in used}
 
     def domain(self) -> Domain:
         """The tracks with their displaced gates, the commanded speed, and up to so many obstacles."""
