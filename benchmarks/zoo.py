@@ -61,8 +61,8 @@ VARIANTS = {
     "race_clutter_room": ("race_clutter", "robust",
         "--from race_clutter --task.track room_6 room_4 room_10 s_shaped circle_3d j_shaped --task.only 0 "
         "--task.scale 1 --task.speed 1 2.5 --task.episode-s 15 --task.gate-position 0.2 --task.clutter.sideways 1.5 "
-        "--task.clutter.size 0.1 0.3 --task.clutter.clear 0.4 --steps 6000000 --eval-episodes 20 "
-        "--algo.learning-rate 3e-3",
+        "--task.clutter.size 0.1 0.3 --task.clutter.clear 0.4 --steps 3600000 --eval-episodes 20 "
+        "--algo.learning-rate 3e-3 --reward.weights vel 4 near 0.3 fit 6",
     ),
 }  # fmt: skip
 """Policies of a task by a preset of its own, or by other options: task, preset and options of `train`."""
