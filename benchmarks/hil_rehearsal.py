@@ -8,8 +8,8 @@ As `e2efly hil POLICY --rehearse`: motion capture over UDP, the HIL node, `e2efl
 firmware are processes. Let the machine be quiet. Exit status 1 when fewer than 19 of 20 laps of a policy succeed, when
 99 % of the images come later than 15 ms after their pose, or when a kill ends otherwise than documented. `--speed` is
 the commanded speed of race_clutter, m/s, drawn for each lap; without numbers as the task draws it. `--link-delay` is
-the radio's, as the command takes it; left out: what the vehicle's latency leaves. `--room` flies race_clutter_room in
-a room of 6x6x3 m, as it is trained, inside the fence that firmware_flights.py has there.
+the radio's, as the command takes it; left out: what the vehicle's latency leaves. `--room` flies in a
+room of 6x6x3 m: the policy, the worlds and the fence that firmware_flights.py has there.
 """
 
 import sys
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import get_args
 
 from common import arguments, table, write
-from firmware_flights import FENCE
+from firmware_flights import FENCE, IN_ROOM, WORLD
 
 from e2efly.simulation.device import prepare
 from e2efly.validation import firmware_program
@@ -39,7 +39,7 @@ def main() -> None:
         room=False,
     )  # fmt: skip
     if args.room:
-        args.policies, args.speed = ["race_clutter_room"], []
+        args.policies = [IN_ROOM["race_clutter"][0]]
     prepare("cpu")
     firmware_program.chosen()
     laps, kills, rows, ends = dict[str, list[Lap]](), list[Lap](), list[dict[str, str]](), list[dict[str, str]]()
@@ -71,6 +71,7 @@ def main() -> None:
 def _plan(name: str, args: Namespace) -> RehearsalPlan:
     own = candidate(name, args.vehicle)
     changed = {"speed": tuple(args.speed)} if args.speed and own.task.name == "race_clutter" else {}
+    changed = WORLD if args.room else changed
     found = candidate(name, args.vehicle, task=changed)
     delay = None if args.link_delay is None else float(args.link_delay)
     fence = FENCE if args.room else None

@@ -4,7 +4,7 @@ configuration and the curve of its training.
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
     python benchmarks/zoo.py --again
-    python benchmarks/zoo.py --runs DIR ... [--name race_any]
+    python benchmarks/zoo.py --runs DIR ...
     python benchmarks/zoo.py --images
     python benchmarks/zoo.py --domains
 
@@ -15,8 +15,7 @@ vehicles in still air. The success that is stated is that of the lone ONNX file,
 `eval --stress`, which nothing was chosen by; in the rows, of a policy that sees, of the first 250 of them.
 
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
-`--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here; of a variant, under
-its name.
+`--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
 `--domains` trains nothing: it writes into the contract of each file that says nothing of its courses the domain of its
 preset's task, by which it was trained; the graph with its weights stays, byte by byte.
@@ -56,16 +55,8 @@ from e2efly.validation.evaluation import candidate
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import vehicle_names
 
-VARIANTS = {
-    "race_any": ("race", "any_track", ""),
-    "race_clutter_room": ("race_clutter", "robust",
-        "--from race_clutter --task.track room_6 room_4 room_10 s_shaped circle_3d j_shaped --task.only 0 "
-        "--task.scale 1 --task.speed 1 2.5 --task.episode-s 15 --task.gate-position 0.2 --task.clutter.sideways 1.5 "
-        "--task.clutter.size 0.1 0.3 --task.clutter.clear 0.4 --steps 3600000 --eval-episodes 20 "
-        "--algo.learning-rate 3e-3 --reward.weights vel 4 near 0.3 fit 6",
-    ),
-}  # fmt: skip
-"""Policies of a task by a preset of its own, or by other options: task, preset and options of `train`."""
+VARIANTS = {"race_any": ("race", "any_track")}
+"""Policies of a task by a preset of its own: task and preset."""
 USUAL_ALONE = tuple(VARIANTS)
 """For the usual vehicle alone."""
 SEEING = (USUAL, "vis_h")
@@ -86,7 +77,7 @@ def run(*command: str) -> None:
 
 def algorithms(task: str) -> tuple[str, ...]:
     """What is tried, in this order."""
-    return (TASKS[VARIANTS.get(task, (task,))[0]].best,)
+    return (TASKS[VARIANTS.get(task, (task, ""))[0]].best,)
 
 
 def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
@@ -97,18 +88,18 @@ def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
     return {row: min(found["success"] for found in criteria.values()) for row, criteria in rows.items()}
 
 
-def recipe(vehicle: str, task: str) -> tuple[str, str, str]:
-    """The task that a policy is of, the preset by which it is learned (empty: the one that `train` takes), options."""
-    kind, own, more = VARIANTS.get(task, (task, "", ""))
+def recipe(vehicle: str, task: str) -> tuple[str, str]:
+    """The task that a policy is of, and the preset by which it is learned; empty: the one that `train` takes."""
+    kind, own = VARIANTS.get(task, (task, ""))
     robust = vehicle not in family_names() and TASKS[kind].best in TASKS[kind].robust
-    return kind, own or ("robust" if robust else ""), more
+    return kind, own or ("robust" if robust else "")
 
 
 def trained(vehicle: str, task: str, algo: str, seed: int, out: Path) -> None:
     """Train a run into a folder."""
-    kind, name, more = recipe(vehicle, task)
+    kind, name = recipe(vehicle, task)
     preset = ("--preset", name) if name else ()
-    options = (*more.split(), "--vehicle", vehicle, "--seed", str(seed), "--out", str(out), "--no-plots")
+    options = ("--vehicle", vehicle, "--seed", str(seed), "--out", str(out), "--no-plots")
     run("train", kind, "--algo", algo, *preset, *options)
 
 
@@ -116,7 +107,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
     """What there is to say of a run, and what it is chosen by among others, where it is: its worst success by its own
     report or, of a robust one, in the rows.
     """
-    report, together, (kind, name, _) = folder / "report.json", vehicle in family_names(), recipe(vehicle, task)
+    report, together, (_, name) = folder / "report.json", vehicle in family_names(), recipe(vehicle, task)
     lone = shutil.copy(out / "policy.onnx", folder / "lone.onnx")  # without its run: on the vehicle of its contract
     run("eval", str(lone), "--json", str(report), "--plots", str(folder / "plots"))
     suites = json.loads(report.read_text())["criteria"]
@@ -128,9 +119,9 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
             rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
             at_once = rows.pop(ALL)
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
-        if TASKS[kind].cameras:
+        if TASKS[task].cameras:
             more |= {"mean_speed_m_s": {name: suite["mean_speed_m_s"] for name, suite in suites.items()}}
-        fewer = ("--episodes", str(SEEN)) if TASKS[kind].cameras else ()
+        fewer = ("--episodes", str(SEEN)) if TASKS[task].cameras else ()
         more |= {"stress": stressed(out / "policy.onnx", folder, *fewer)}
     return reported, {
         "algorithm": summary["algorithm"],
@@ -187,7 +178,7 @@ def starts_of(policy: Path) -> dict[str, np.ndarray]:
 def declare(file: Path) -> None:
     """Let the contract of a file say for which courses it was trained, if it does not."""
     vehicle, task = file.parent.name, file.stem
-    kind, preset, _ = recipe(vehicle, task)
+    kind, preset = recipe(vehicle, task)
     contract, graph = load_policy(file).contract, onnx.load(file).graph
     if contract.courses is None:
         courses = presets.preset(kind, TASKS[kind].best, preset or presets.NOMINAL).task.domain()
@@ -216,7 +207,6 @@ def main() -> None:
         again=False,
         images=False,
         runs=[],
-        name="",
     )
     if options.digests:
         for file in FOLDER.glob("*/*.onnx"):
@@ -247,7 +237,8 @@ def main() -> None:
     for out in map(Path, options.runs):
         with tempfile.TemporaryDirectory() as folder:
             config = RunDirectory(out).config()
-            vehicle, task = config.env.vehicle, options.name or config.task.name
+            vehicle, kind = config.env.vehicle, config.task.name
+            task = next((name for name, (of, _) in VARIANTS.items() if of == kind and config.task.own_worlds), kind)
             _, about = judged(vehicle, task, out, Path(folder), chosen=False)
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:

@@ -32,7 +32,6 @@ TASKS = {
     "land_visual": "Land on a pad that only a camera shows.",
     "avoid": "Fly fast through a forest that only a depth camera shows.",
     "race_clutter": "Race among obstacles that only a depth camera shows.",
-    "race_clutter_room": "The same in a room of 6x6 m, slowly ([a small room](hil.md#a-small-room)).",
 }
 VEHICLES = {
     "any": "Any quadrotor",
@@ -122,7 +121,7 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     """The lines of one policy's card."""
     name = f"{vehicle}/{task}"
     policy = policy_file(name)
-    kind = task.removesuffix("_any").removesuffix("_room")
+    kind = task.removesuffix("_any")
     options = "" if vehicle == USUAL else f" --vehicle {vehicle}"
     preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
     stress = about.get("stress", {})

@@ -59,12 +59,11 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     """Rows that failed in every start of a policy without a memory, of all vehicles, and what zoo.json says of them."""
     robust = [(vehicle, task) for vehicle, task in POLICIES if "stress" in contents()[vehicle][task]]
     assert {task for _, task in robust} == {
-        "avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter", "race_clutter_room",
-        "race_speed", "track",
+        "avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter", "track",
     }  # fmt: skip
     for vehicle, task in robust:
         stated = contents()[vehicle][task]["stress"]
-        assert set(stated) == set(rows_for(TASKS[task.removesuffix("_room")].cameras))
+        assert set(stated) == set(rows_for(TASKS[task].cameras))
     for vehicle in [vehicle for vehicle, task in robust if task == "race"]:
         rows = ("mass x1.25", "delay +40 ms", "thrust x0.8")
         report = stress("race", 60, rows=rows, vehicle=vehicle, seed=123)
@@ -75,9 +74,9 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
 
 
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
-    assert set(contents()[USUAL]) == {*TASKS, "race_any", "race_clutter_room"}
+    assert set(contents()[USUAL]) == {*TASKS, "race_any"}
     assert set(contents()) == {*vehicle_names(), *family_names()}
-    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == {*TASKS, "race_any", "race_clutter_room"}
+    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == {*TASKS, "race_any"}
     assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
 
 
