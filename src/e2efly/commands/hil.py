@@ -150,10 +150,11 @@ def run(asked: Asked) -> int:
 
 def _fence(o: Hil) -> Fence | None:
     """The fence that the options give. None: they give none."""
-    given = {"low": o.fence_low, "high": o.fence_high}
-    fence = Fence(**{name: point for name, point in given.items() if point is not None})
+    if o.fence_low is None and o.fence_high is None:
+        return None
+    fence = Fence(o.fence_low or Fence().low, o.fence_high or Fence().high)
     check_fence(fence)
-    return None if given == {"low": None, "high": None} else fence
+    return fence
 
 
 def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Terminal) -> "Scenery":
