@@ -34,9 +34,10 @@ class RaceSpeedConfig(TaskConfig):
     world: ClassVar[str] = "e2efly.tasks.race_speed.world:RaceSpeed"
     goal_class: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedGoal"
     route: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedRoute"
+    precision: ClassVar = "duration"
     best: ClassVar = "bptt"
-    robust: ClassVar = {"bptt": Robust(steps=10_000_000, chunk=200, recurrent=96, hidden=(96, 96))}
-    family: ClassVar = {"bptt": Robust(steps=16_000_000, chunk=200, recurrent=96, hidden=(96, 96))}
+    robust: ClassVar = {"bptt": Robust(steps=8_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
+    family: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
 
     episode_s: float = 30.0
     """Length of an episode, s."""
@@ -80,7 +81,7 @@ class RaceSpeedConfig(TaskConfig):
     def recipe(cls, algo: str) -> TrainConfig:
         """Rewards for progress along the way, up to the commanded speed."""
         settings: AlgorithmConfig = BPTTConfig(**SETTINGS)
-        weights, steps = WEIGHTS, 10_000_000
+        weights, steps = WEIGHTS, 8_000_000
         if algo == "ppo":
             settings = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
             weights = {
