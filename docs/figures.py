@@ -81,9 +81,9 @@ ZOO, NONE = "the zoo's policies", "none"
 POLICIES = {
     **dict.fromkeys(
         (
-            "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "race_speed", "airsim", "firmware_flights",
+            "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
             "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "fault_campaign", "onboard",
-            "c_export",
+            "c_export", "race_speed",
         ),
         ZOO,
     ),
