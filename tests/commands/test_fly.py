@@ -19,7 +19,7 @@ from rosbags.highlevel import AnyReader
 
 from e2efly.commands.fly import Fly, _chosen, _prepared, parse
 from e2efly.commands.fly import run as fly_command
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal as Console
 from e2efly.flight.betaflight.codec import REPLY, MspFrame, encode
 from e2efly.flight.betaflight.messages import Name
 from e2efly.flight.settings import Fence, FlightSettings
@@ -115,18 +115,18 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
 def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys: pytest.CaptureFixture) -> None:
     """Of the zoo's policies; and the speed is said. A speed outside of the training is refused by name."""
     given = ["crazyflie/race", "--vehicle", "crazyflie", "--goal.track", "room_6", "--goal.speed"]
-    plan = _prepared(parse([*given, "4"]), Terminal())
+    plan = _prepared(parse([*given, "4"]), Console())
     assert plan.policy == policy_file("crazyflie/race_speed")
     said = " ".join(capsys.readouterr().out.split())
     assert "crazyflie/race_speed flies in place of crazyflie/race" in said
     assert "It is told to fly at 4 m/s (goal.speed)." in said
     with pytest.raises(ValueError, match="goal: speed is 20 m/s; trained for 2 to 12 m/s"):
-        _prepared(parse([*given, "20"]), Terminal())
+        _prepared(parse([*given, "20"]), Console())
     alone = parse(["race_speed"])
-    assert _prepared(alone, Terminal()).policy == policy_file("race_speed")
+    assert _prepared(alone, Console()).policy == policy_file("race_speed")
     assert "It is told to fly at 3 m/s (goal.speed)." in " ".join(capsys.readouterr().out.split())
     copied = replace(parse(["race", "--goal.speed", "4"]), policy=policy_file("race_any"))
-    assert _chosen(copied, Terminal())[0] == policy_file("race_speed")
+    assert _chosen(copied, Console())[0] == policy_file("race_speed")
 
 
 def test_each_image_has_an_option_of_its_own() -> None:
