@@ -67,7 +67,10 @@ def test_a_flight_is_told_a_speed(tmp_path: Path) -> None:
     course = RaceSpeedRoute().course(SHAPE, 1 / 30)
     body = Odometry(0.0, course.start, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)).batch
     shown = course.goal.observe(course.memory, np.zeros(1), body)[0]
-    assert shown[-1] == SLOW == 3.0
+    assert SLOW == 3.0
+    assert np.linalg.norm(shown[-3:]) == pytest.approx(SLOW, rel=1e-3)
+    ahead = load_track("four_gates").position[0] + [0.3, 0.0, 0.0] - course.start  # 0.3 m behind the gate
+    np.testing.assert_allclose(shown[-3:], SLOW * ahead / np.linalg.norm(ahead), rtol=1e-3)
     fast = RaceSpeedRoute(track="room_6", speed=5.0, laps=2)
     assert fast.notes == ["It is told to fly at 5 m/s (goal.speed)."]
     again = RaceSpeedRoute.drawn(fast.course(SHAPE, 1 / 30), tmp_path / "drawn.toml")

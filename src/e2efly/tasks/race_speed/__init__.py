@@ -34,7 +34,6 @@ class RaceSpeedConfig(TaskConfig):
     world: ClassVar[str] = "e2efly.tasks.race_speed.world:RaceSpeed"
     goal_class: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedGoal"
     route: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedRoute"
-    precision: ClassVar = "duration"
     best: ClassVar = "bptt"
     robust: ClassVar = {"bptt": Robust(steps=8_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
     family: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
@@ -48,8 +47,8 @@ class RaceSpeedConfig(TaskConfig):
     """Half-width of each gate's random offset from its place on the track, m per axis."""
     gate_yaw: float = number(0.15, high=ANGLE)
     """Half-width of each gate's random rotation, rad."""
-    speed: tuple[float, float] = number((2.0, 12.0), high=SPEED, rising=True)
-    """Commanded speed, m/s, uniform per episode."""
+    speed: tuple[float, float] = number((2.0, 12.0), above=0, high=SPEED, rising=True)
+    """Commanded speed, m/s, log-uniform per episode."""
     position: float = 0.4
     """Radius of the ball around the track's start in which episodes start, m."""
     laps: int = 1

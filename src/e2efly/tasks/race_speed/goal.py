@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,10 +11,12 @@ from e2efly.config import number
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.config.storage import write_atomically
+from e2efly.control.vectors import Array
 from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import track_text
 from e2efly.policy.goal import Course, Shape
-from e2efly.tasks.race.any_goal import COMMANDED, AnyRaceGoal, AnyRaceMemory
+from e2efly.policy.observation import Field
+from e2efly.tasks.race.any_goal import AnyRaceGoal, AnyRaceMemory, towards
 from e2efly.tasks.race.goal import GatesRoute
 from e2efly.tasks.race_speed import RaceSpeedConfig
 
@@ -28,7 +31,17 @@ class RaceSpeedGoal(AnyRaceGoal):
     config: RaceSpeedConfig
     shape: Shape
 
-    observation = (*AnyRaceGoal.observation, COMMANDED)
+    def desired_velocity(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
+        """The commanded velocity."""
+        return towards(memory, body)
+
+    observation = (
+        *AnyRaceGoal.observation,
+        (
+            Field("desired_velocity", 3, "world", "m/s", 4.0, "velocity to fly at, towards the next gate"),
+            desired_velocity,
+        ),
+    )
 
 
 @dataclass(frozen=True)
