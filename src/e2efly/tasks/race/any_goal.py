@@ -67,14 +67,14 @@ class Ahead:
         return Ahead(found[..., :3] + STRAIGHT_ON * beyond[..., None] * axis, axis, found[..., 5:])
 
 
-def towards(memory: AnyRaceMemory, body: Any) -> Array:
-    """(n, 3) the commanded velocity, world, m/s: at the commanded speed to a point close behind the next gate.
+def towards(memory: AnyRaceMemory, body: Any, speed: Array) -> Array:
+    """(n, 3) a velocity, world, m/s, to a point close behind the next gate, at a speed (n,).
 
     In the middle of the gate it still points straight through.
     """
     ahead = Ahead.of(memory)
     away = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0] - body.position
-    return memory.speed[:, None] * away / (namespace(away).linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
+    return speed[:, None] * away / (namespace(away).linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,7 @@ class RaceClutter(RaceClutterGoal):
         moved, outcome = self.verdict(memory, before, after, time, hit)
         signals = {
             "desired_speed": memory.speed,
-            "desired_velocity": towards(memory, after),
+            "desired_velocity": towards(memory, after, memory.speed),
             "overhang": self.overhang(memory, after),
         }
         return moved, dataclasses.replace(outcome, signals=signals)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.courses.gates import Tracks
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
-from e2efly.tasks.race.any_goal import AnyRaceMemory, towards
+from e2efly.tasks.race.any_goal import AnyRaceMemory
 from e2efly.tasks.race.any_world import AnyRace, begun, displaced, several
 from e2efly.tasks.race_speed import RaceSpeedConfig
 from e2efly.tasks.race_speed.goal import RaceSpeedGoal
@@ -54,5 +54,6 @@ class RaceSpeed(AnyRace, RaceSpeedGoal):
     ) -> tuple[AnyRaceMemory, Outcome]:
         """The verdict of any race, with the commanded speed and velocity for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
-        wanted = {"desired_speed": memory.speed, "desired_velocity": towards(memory, after)}
+        velocity = self.desired_velocity(memory, time, after)
+        wanted = {"desired_speed": jnp.linalg.norm(velocity, axis=-1), "desired_velocity": velocity}
         return moved, dataclasses.replace(outcome, signals=outcome.signals | wanted)
