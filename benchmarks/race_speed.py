@@ -84,7 +84,8 @@ def measured(found: Candidate, env: Env, name: str, speed: float, starts: int) -
         success.append(succeeded)
     share, speeds = float(np.concatenate(success).mean()), np.concatenate(along)
     row = {"track": name, "commanded, m/s": speed, "starts": BATCH * len(parts), "success, %": round(100 * share, 1)}
-    row |= {"mean speed, m/s": round(float(speeds.mean()), 2) if len(speeds) else None, "top speed, m/s": round(top, 1)}
+    mean = round(float(speeds.mean()), 2) if len(speeds) else None
+    row |= {"mean speed, m/s": mean, "top speed, m/s": round(float(top), 1)}
     side, ceiling = ROOMS.get(name, (np.nan, np.nan))
     walls = {"to the wall, m": side / 2 - far, "under the ceiling, m": ceiling - high}
     return row | {what: round(float(x), 2) if np.isfinite(x) else "-" for what, x in walls.items()}

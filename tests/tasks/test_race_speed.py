@@ -15,7 +15,7 @@ from e2efly.policy.goal import Shape
 from e2efly.policy.odometry import Odometry
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.race_speed import RaceSpeedConfig
-from e2efly.tasks.race_speed.goal import SLOW, RaceSpeedRoute
+from e2efly.tasks.race_speed.goal import QUICKEST, SLOW, RaceSpeedRoute
 from e2efly.tasks.race_speed.world import RaceSpeed
 from e2efly.tasks.task import make_task
 
@@ -67,7 +67,13 @@ def test_a_flight_is_told_a_speed(tmp_path: Path) -> None:
     course = RaceSpeedRoute().course(SHAPE, 1 / 30)
     body = Odometry(0.0, course.start, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)).batch
     shown = course.goal.observe(course.memory, np.zeros(1), body)[0]
-    assert shown[-1] == SLOW == 3.0
+    assert SLOW == 3.0
+    assert np.linalg.norm(shown[-3:]) == pytest.approx(SLOW, rel=1e-3)
+    ahead = load_track("four_gates").position[0] + [0.3, 0.0, 0.0] - course.start  # 0.3 m behind the gate
+    np.testing.assert_allclose(shown[-3:], SLOW * ahead / np.linalg.norm(ahead), rtol=1e-3)
+    close = RaceSpeedRoute(track="room_4", speed=12.0).course(SHAPE, 1 / 30)  # no faster than the gates allow
+    asked = close.goal.observe(close.memory, np.zeros(1), body)[0, -3:]
+    assert np.linalg.norm(asked) == pytest.approx(QUICKEST * 1.905, rel=1e-3)
     fast = RaceSpeedRoute(track="room_6", speed=5.0, laps=2)
     assert fast.notes == ["It is told to fly at 5 m/s (goal.speed)."]
     again = RaceSpeedRoute.drawn(fast.course(SHAPE, 1 / 30), tmp_path / "drawn.toml")

@@ -8,7 +8,7 @@ from typing import Any
 
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import STRAIGHT_ON, Tracks
-from e2efly.policy.goal import Observed, Outcome, Shape
+from e2efly.policy.goal import Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.racing import Racing
@@ -16,6 +16,8 @@ from e2efly.tasks.verdicts import distance, offsets
 
 SHOWN = 3
 """Number of gates that the policy observes."""
+BEHIND = 0.3
+"""Distance behind a gate of the point to which a commanded velocity is directed, m."""
 HIGHEST = 3.0
 """Limit of the observed height above the ground, m."""
 
@@ -34,13 +36,6 @@ class AnyRaceMemory:
     def index(self) -> Array:
         """(n,) the next gate, counted from 0 within a lap."""
         return self.passed % self.tracks.count
-
-
-COMMANDED: Observed = (
-    Field("desired_speed", 1, "none", "m/s", 8.0, "speed to fly at"),
-    lambda goal, memory, time, body: memory.speed[:, None],
-)
-"""The commanded speed, for policies that obey one."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +65,16 @@ class Ahead:
         found = xp.take_along_axis(table, row[..., None], axis=1)
         axis = xp.concatenate([found[..., 3:5], xp.zeros_like(found[..., :1])], axis=-1)
         return Ahead(found[..., :3] + STRAIGHT_ON * beyond[..., None] * axis, axis, found[..., 5:])
+
+
+def towards(memory: AnyRaceMemory, body: Any, speed: Array) -> Array:
+    """(n, 3) a velocity, world, m/s, to a point close behind the next gate, at a speed (n,).
+
+    In the middle of the gate it still points straight through.
+    """
+    ahead = Ahead.of(memory)
+    away = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0] - body.position
+    return speed[:, None] * away / (namespace(away).linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,6 @@ from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
 
-BEHIND = 0.3
-"""Distance behind a gate of the point to which the wanted velocity is directed, m."""
 LOWEST_START = 0.3
 """Smallest height of the feet above the ground in a start, m."""
 
@@ -151,13 +149,3 @@ def between(ends: tuple[Any, Any], u: Float[Array, " n"]) -> Float[Array, " n"]:
     """Uniform numbers in [-1, 1] as uniform numbers between two ends."""
     low, high = ends
     return (low + high) / 2 + (high - low) / 2 * u
-
-
-def towards(memory: AnyRaceMemory, state: State) -> Float[Array, "n 3"]:
-    """Velocity at the commanded speed towards a point close behind the next gate, world, m/s.
-
-    In the middle of the gate it still points straight through.
-    """
-    ahead = Ahead.of(memory)
-    away = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0] - state.position
-    return memory.speed[:, None] * away / (jnp.linalg.norm(away, axis=-1, keepdims=True) + 1e-3)

@@ -18,7 +18,7 @@ from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import load_track, track_text
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
-from e2efly.tasks.race.any_goal import COMMANDED, Ahead, AnyRaceMemory
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets
@@ -51,13 +51,17 @@ class RaceClutterGoal(Goal):
         """The directions of flight through the next two gates."""
         return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
+    def desired_speed(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
+        """The commanded speed."""
+        return memory.speed[:, None]
+
     observation = (
         (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"), target_offsets),
         (
             Field("gate_axes", 6, "world", "1", 1.0, "unit vectors along which the next two gates are flown through"),
             flat_axes,
         ),
-        COMMANDED,
+        (Field("desired_speed", 1, "none", "m/s", 8.0, "speed to fly at"), desired_speed),
     )
 
     def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:

@@ -16,8 +16,8 @@ from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.generate import clutter
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
-from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory
-from e2efly.tasks.race.any_world import between, displaced, several, towards
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory, towards
+from e2efly.tasks.race.any_world import between, displaced, several
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.race_clutter.goal import RaceClutterGoal
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
@@ -121,7 +121,7 @@ class RaceClutter(RaceClutterGoal):
         moved, outcome = self.verdict(memory, before, after, time, hit)
         signals = {
             "desired_speed": memory.speed,
-            "desired_velocity": towards(memory, after),
+            "desired_velocity": towards(memory, after, memory.speed),
             "overhang": self.overhang(memory, after),
         }
         return moved, dataclasses.replace(outcome, signals=signals)

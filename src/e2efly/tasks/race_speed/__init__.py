@@ -22,7 +22,7 @@ from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
 from e2efly.tasks.registry import register
 
-WEIGHTS = {"vel": 1.0, "fitlog": 10.0, "anglev_sq": 0.001, "act2_sq": 0.01}
+WEIGHTS = {"vel": 1.0, "progway": 2.5, "fitlog": 10.0, "anglev_sq": 0.001, "act2_sq": 0.01}
 SETTINGS = {"learning_rate": 5e-3, "learning_rate_end": 2e-4, "gradient_decay": 0.6, "average": 0.99}
 
 
@@ -35,8 +35,8 @@ class RaceSpeedConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedGoal"
     route: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedRoute"
     best: ClassVar = "bptt"
-    robust: ClassVar = {"bptt": Robust(steps=10_000_000, chunk=200, recurrent=96, hidden=(96, 96))}
-    family: ClassVar = {"bptt": Robust(steps=16_000_000, chunk=200, recurrent=96, hidden=(96, 96))}
+    robust: ClassVar = {"bptt": Robust(steps=5_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
+    family: ClassVar = {"bptt": Robust(steps=6_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
 
     episode_s: float = 30.0
     """Length of an episode, s."""
@@ -47,8 +47,8 @@ class RaceSpeedConfig(TaskConfig):
     """Half-width of each gate's random offset from its place on the track, m per axis."""
     gate_yaw: float = number(0.15, high=ANGLE)
     """Half-width of each gate's random rotation, rad."""
-    speed: tuple[float, float] = number((2.0, 12.0), high=SPEED, rising=True)
-    """Commanded speed, m/s, uniform per episode."""
+    speed: tuple[float, float] = number((2.0, 12.0), above=0, high=SPEED, rising=True)
+    """Commanded speed, m/s, log-uniform per episode."""
     position: float = 0.4
     """Radius of the ball around the track's start in which episodes start, m."""
     laps: int = 1
@@ -80,7 +80,7 @@ class RaceSpeedConfig(TaskConfig):
     def recipe(cls, algo: str) -> TrainConfig:
         """Rewards for progress along the way, up to the commanded speed."""
         settings: AlgorithmConfig = BPTTConfig(**SETTINGS)
-        weights, steps = WEIGHTS, 10_000_000
+        weights, steps = WEIGHTS, 5_000_000
         if algo == "ppo":
             settings = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
             weights = {

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,15 +11,22 @@ from e2efly.config import number
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.config.storage import write_atomically
+from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import track_text
 from e2efly.policy.goal import Course, Shape
-from e2efly.tasks.race.any_goal import COMMANDED, AnyRaceGoal, AnyRaceMemory
+from e2efly.policy.observation import Field
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, AnyRaceMemory, towards
 from e2efly.tasks.race.goal import GatesRoute
 from e2efly.tasks.race_speed import RaceSpeedConfig
+from e2efly.tasks.verdicts import distance
 
 SLOW = 3.0
 """Speed of a flight for which none is given, m/s."""
+
+QUICKEST = 1.6
+"""Largest speed that is commanded, per metre from the next gate to the one after it, 1/s. Where gates stand close, a
+vehicle has no time to turn from one to the other at any speed."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,18 @@ class RaceSpeedGoal(AnyRaceGoal):
     config: RaceSpeedConfig
     shape: Shape
 
-    observation = (*AnyRaceGoal.observation, COMMANDED)
+    def desired_velocity(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
+        """The commanded velocity: at the commanded speed, or at `QUICKEST` where this is slower."""
+        here, there = (Ahead.of(memory).centre[:, i] for i in range(2))
+        return towards(memory, body, namespace(here).minimum(memory.speed, QUICKEST * distance(here, there)))
+
+    observation = (
+        *AnyRaceGoal.observation,
+        (
+            Field("desired_velocity", 3, "world", "m/s", 4.0, "velocity to fly at, towards the next gate"),
+            desired_velocity,
+        ),
+    )
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from e2efly.courses.gates import Tracks
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
 from e2efly.tasks.race.any_goal import AnyRaceMemory
-from e2efly.tasks.race.any_world import AnyRace, begun, between, displaced, several, towards
+from e2efly.tasks.race.any_world import AnyRace, begun, displaced, several
 from e2efly.tasks.race_speed import RaceSpeedConfig
 from e2efly.tasks.race_speed.goal import RaceSpeedGoal
-from e2efly.tasks.task import uniform
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])
@@ -46,7 +45,8 @@ class RaceSpeed(AnyRace, RaceSpeedGoal):
         c = self.config
         tracks = displaced(track_key, n, self.given, c.gate_position, c.gate_yaw)
         state = begun(state_key, n, c.position, self.shape, tracks.gates.start, tracks.gates.start_yaw)
-        speed = between(c.speed, uniform(speed_key, n, 1)[:, 0])
+        low, high = c.speed
+        speed = low * (high / low) ** jax.random.uniform(speed_key, (n,))
         return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32), speed)
 
     def advance(
@@ -54,5 +54,6 @@ class RaceSpeed(AnyRace, RaceSpeedGoal):
     ) -> tuple[AnyRaceMemory, Outcome]:
         """The verdict of any race, with the commanded speed and velocity for the reward."""
         moved, outcome = super().advance(memory, before, after, time, timed_out)
-        wanted = {"desired_speed": memory.speed, "desired_velocity": towards(memory, after)}
+        velocity = self.desired_velocity(memory, time, after)
+        wanted = {"desired_speed": jnp.linalg.norm(velocity, axis=-1), "desired_velocity": velocity}
         return moved, dataclasses.replace(outcome, signals=outcome.signals | wanted)
