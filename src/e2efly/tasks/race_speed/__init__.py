@@ -22,7 +22,7 @@ from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
 from e2efly.tasks.registry import register
 
-WEIGHTS = {"vel": 1.0, "progway": 2.5, "fitlog": 10.0, "anglev_sq": 0.001, "act2_sq": 0.01}
+WEIGHTS = {"vel": 1.0, "progway": 2.5, "fitlog": 20.0, "anglev_sq": 0.001, "act2_sq": 0.01}
 SETTINGS = {"learning_rate": 5e-3, "learning_rate_end": 2e-4, "gradient_decay": 0.6, "average": 0.99}
 
 
