@@ -98,7 +98,8 @@ def _row(name: str, laps: list[Lap]) -> dict[str, str]:
 
 
 def _ms(spreads: list[Spread]) -> str:
-    middle, worst = (max((getattr(x, name) for x in spreads), default=0.0) for name in ("median", "p99"))
+    known = [x for x in spreads if x.p99 == x.p99]  # a lap that was not flown has none
+    middle, worst = (max((getattr(x, name) for x in known), default=0.0) for name in ("median", "p99"))
     return f"{1e3 * middle:.1f} / {1e3 * worst:.1f} ms"
 
 

@@ -181,7 +181,8 @@ the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware 
 two cores. Times are the median / 99 % of the worst lap. In the second table each process is killed once
 in flight. [How the rehearsal works](hil.md#rehearse-it-first).""",
     "hil_room": """
-As above, for VIS-R, in the fence of the room in which [whole
+As above, for VIS-R. Three of the 20 laps were not begun ([why](hil.md#a-small-room)). The fence is that of the
+room in which [whole
 flights](#the-papers-six-tasks-through-real-betaflight-firmware-in-a-room-of-6x6-m) are flown. Other programs ran on
 the same two cores. [The policy and its worlds](hil.md#a-small-room).""",
     "identify_betaflight": """
