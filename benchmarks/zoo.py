@@ -242,7 +242,8 @@ def main() -> None:
     for out in map(Path, options.runs):
         with tempfile.TemporaryDirectory() as folder:
             config = RunDirectory(out).config()
-            vehicle, task = config.env.vehicle, "race_any" if config.task.own_worlds else config.task.name
+            vehicle, kind = config.env.vehicle, config.task.name
+            task = next((name for name, (of, _) in VARIANTS.items() if of == kind and config.task.own_worlds), kind)
             _, about = judged(vehicle, task, out, Path(folder), chosen=False)
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:

@@ -42,6 +42,7 @@ TITLES = {
     "thrown_starts": "Thrown starts that nothing saves",
     "stable_baselines3_ppo": "Time to the hover criterion, Stable-Baselines3 on the same environment, at most 200 s",
     "any_track": "One policy for any track",
+    "race_speed": "Racing at a commanded speed",
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
     "robust": "The preset robust: seconds from process start, cold, and success under stress",
@@ -57,11 +58,13 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
+    "room_flights": "The paper's six tasks through real Betaflight firmware, in a room of 6x6 m",
     "controllers": "Hover controllers, and where learning pays",
     "filter": "The filter of `fly --guard filter`: flights against it, and what it costs",
     "plants_by_sight": "Policies that see, on plants that render",
     "image_faults": "Cameras that break in flight",
     "hil_rehearsal": "Hardware in the loop, rehearsed in real time",
+    "hil_room": "Hardware in the loop, rehearsed in a room of 6x6 m",
     "pad_masks": "Masks by the package's network, of rendered pads that it never saw",
     "firmware_faults": "Faults injected into flights of the real firmware",
     "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
@@ -80,8 +83,8 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "fault_campaign", "onboard",
-            "c_export",
+            "room_flights", "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "hil_room",
+            "fault_campaign", "onboard", "c_export", "race_speed",
         ),
         ZOO,
     ),
@@ -103,7 +106,8 @@ POLICIES = {
 """The policies of each table: presets by which they were trained, the zoo's, or none."""
 SCRIPTS = {
     "identify_betaflight": "identify.py --plant betaflight", "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
-    "zoo_stress_by_sight": "zoo_stress.py --by-sight",
+    "hil_room": "hil_rehearsal.py --room",
+    "zoo_stress_by_sight": "zoo_stress.py --by-sight", "room_flights": "firmware_flights.py --room",
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
 FIRST = """
@@ -120,6 +124,10 @@ NOTES = {
 Plain: `cc -O2`. Native: `cc -O3 -march=native`. Difference: the largest difference of an action from the
 value of the policy.onnx in double precision, on 200 random inputs; for ONNX Runtime likewise.
 [What is exported](onboard.md#as-c).""",
+    "race_speed": """
+Two laps, one of an open track. Speeds are along the way from the first gate on: the mean of the races that succeed, and
+the highest of all. The distance to the wall is the smallest of any race's path, of the centre of mass.
+[What is flown](tasks.md#at-a-commanded-speed).""",
     "onboard": """
 Each flies hover with a controller that gives the answers of recorded firmware. [How to install
 it](onboard.md).""",
@@ -173,6 +181,11 @@ The zoo's race_clutter of VIS-H, commanded to fly at 4 to 6 m/s, with a radio of
 the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware are processes in real time on
 two cores. Times are the median / 99 % of the worst lap. In the second table each process is killed once
 in flight. [How the rehearsal works](hil.md#rehearse-it-first).""",
+    "hil_room": """
+As above, for VIS-R. Three of the 20 laps were not begun ([why](hil.md#a-small-room)). The fence is that of the
+room in which [whole
+flights](#the-papers-six-tasks-through-real-betaflight-firmware-in-a-room-of-6x6-m) are flown. Other programs ran on
+the same two cores. [The policy and its worlds](hil.md#a-small-room).""",
     "identify_betaflight": """
 Each log has 30 s of `e2efly fly excitation`, in a fence of 12 x 12 x 4.8 m, flown by the bridge through
 Betaflight 4.6 in virtual time. The true delay is measured by the rig's own clock: the age of the poses, and
@@ -195,6 +208,11 @@ seeds of avoid on the nominal vehicle, with 1000 unseen forests each, succeed at
 99.7 / 99.3 / 98.7, 99.8 / 98.9 / 97.7 and 99.4 / 98.8 / 98.4 %. They fly the 40 m from a standing start
 in 9.1, 7.5 and 7.7 s, which is 87, 67 and 52 % of the commanded speed. The first seed was trained in
 273 s.""",
+    "room_flights": """
+The fence is 5.6 x 5.6 x 2.7 m, 0.2 m before the walls; it would end a policy's flight before the vehicle
+leaves it. *Flown space*: the box of all true positions of the five flights, from take-off to landing. The races
+fly three laps of `room_6`, and the fastest is told the highest of 8, 7, 6, 5 and 4 m/s at which all five
+flights succeed. The others fly what `e2efly fly` flies without further options.""",
     "firmware_flights": """
 The zoo's policies of VIS-R, as they ship, in all nine tasks. Success is the task's own verdict,
 by the code that judges training. All policies are by the preset `robust`. What the last three see is

@@ -26,6 +26,7 @@ TASKS = {
     "track": "Follow a moving reference.",
     "race": "Fly a lap through gates.",
     "race_any": "Fly a lap of any track: a different one in every episode ([any track](any-track.md)).",
+    "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "gap": "Fly through a narrow tilted slit, banked.",
     "hover_aware": "Fly to a point and keep a moving ball in view.",
     "land_visual": "Land on a pad that only a camera shows.",

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,14 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from e2efly.commands.fly import Fly, parse
+from e2efly.commands.fly import Fly, _chosen, _prepared, parse
 from e2efly.commands.fly import run as fly_command
+from e2efly.commands.terminal import Terminal as Console
 from e2efly.flight.betaflight.codec import REPLY, MspFrame, encode
 from e2efly.flight.betaflight.messages import Name
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.logs.flight_log import read_log
+from e2efly.policy.zoo import policy_file
 from e2efly.tasks.hover.goal import HoverRoute
 from tests.flight.test_msp_client import controller, recorded
 from tests.waiting import free_port, until
@@ -107,6 +110,23 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
     os.mkfifo(tmp_path / "port")
     options = parse(["--link", str(tmp_path / "port"), "hover", "--goal.target", "0", "0", "2"])
     assert isinstance(options.goal, HoverRoute)
+
+
+def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys: pytest.CaptureFixture) -> None:
+    """Of the zoo's policies; and the speed is said. A speed outside of the training is refused by name."""
+    given = ["crazyflie/race", "--vehicle", "crazyflie", "--goal.track", "room_6", "--goal.speed"]
+    plan = _prepared(parse([*given, "4"]), Console())
+    assert plan.policy == policy_file("crazyflie/race_speed")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "crazyflie/race_speed flies in place of crazyflie/race" in said
+    assert "It is told to fly at 4 m/s (goal.speed)." in said
+    with pytest.raises(ValueError, match="goal: speed is 20 m/s; trained for 2 to 12 m/s"):
+        _prepared(parse([*given, "20"]), Console())
+    alone = parse(["race_speed"])
+    assert _prepared(alone, Console()).policy == policy_file("race_speed")
+    assert "It is told to fly at 3 m/s (goal.speed)." in " ".join(capsys.readouterr().out.split())
+    copied = replace(parse(["race", "--goal.speed", "4"]), policy=policy_file("race_any"))
+    assert _chosen(copied, Console())[0] == policy_file("race_speed")
 
 
 def test_each_image_has_an_option_of_its_own() -> None:

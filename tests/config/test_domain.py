@@ -10,6 +10,7 @@ import pytest
 
 from e2efly.config import TaskConfig
 from e2efly.config.domain import Domain, Extent, outside, track_domain, union
+from e2efly.courses.defaults import ROOMS
 from e2efly.courses.gates import Tracks
 from e2efly.courses.random_tracks import CANDIDATES, DOMAIN, NUMBERS, random_tracks
 from e2efly.courses.tracks import RaceTrack, load_track, track_names
@@ -20,6 +21,7 @@ from e2efly.policy.zoo import FOLDER
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
 from e2efly.tasks.race import ANY, RaceConfig
+from e2efly.tasks.race.any_world import displaced
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.race_clutter.world import RaceClutter
@@ -71,14 +73,15 @@ def test_random_tracks_and_those_of_the_package_lie_in_their_domain() -> None:
     reasons = [outside(DOMAIN, track_domain(tracks.track(i))) for i in range(400)]
     assert all("gate_distance" in reason for reason in sum(reasons, ()))  # of the few that are not clear
     assert sum(map(bool, reasons)) <= 8
-    for name in track_names():
+    for name in set(track_names()) - set(ROOMS):  # those of rooms have shorter legs
         assert outside(DOMAIN, track_domain(load_track(name))) == ()
 
 
 def test_displaced_gates_lie_in_the_domain_of_their_task() -> None:
     config = RaceClutterConfig()
     world = RaceClutter.of(config, Shape(0.1, 0.2), 0.02, 1)
-    tracks = jax.tree.map(np.asarray, world._drawn(jax.random.key(3), 100))
+    drawn = displaced(jax.random.key(3), 100, world.given, config.gate_position, config.gate_yaw)
+    tracks = jax.tree.map(np.asarray, drawn)
     for i in range(100):
         assert outside(config.domain(), track_domain(tracks.track(i))) == ()
 
@@ -107,7 +110,7 @@ def test_what_every_task_is_judged_by_and_flies_lies_in_its_training(name: str) 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*/*.onnx")), ids=lambda file: f"{file.parent.name}/{file.stem}")
 def test_every_policy_of_the_zoo_declares_its_training(file: object) -> None:
     contract = load_policy(file).contract  # type: ignore[arg-type]
-    any_track = "gate_openings" in contract.slices
+    any_track = contract.task == "race" and "gate_openings" in contract.slices
     task = RaceConfig(track=ANY) if any_track else TASKS[contract.task].training()
     assert contract.courses == task.domain()
 

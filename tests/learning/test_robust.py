@@ -22,7 +22,8 @@ ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module_
 
 
 def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
-    assert ROBUST == ["avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter", "track"]
+    names = "avoid gap hover hover_aware land land_visual race race_clutter race_speed track"
+    assert names.split() == ROBUST
     for task in ROBUST:
         nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
         assert robust.network.recurrent > 0
@@ -43,7 +44,8 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     said = " ".join(capsys.readouterr().err.split())
     assert (
         "preset 'robust': accepted for avoid by bptt, gap by bptt, hover by bptt or ppo, hover_aware by bptt, "
-        "land by bptt, land_visual by bptt, race by bptt, race_clutter by bptt, track by bptt or ppo" in said
+        "land by bptt, land_visual by bptt, race by bptt, race_clutter by bptt, race_speed by bptt, "
+        "track by bptt or ppo" in said
     )
     assert f"not for {task} by {algo}" in said
 

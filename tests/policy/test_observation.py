@@ -16,6 +16,7 @@ from e2efly.policy.observation import Field, Own
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Imu, Runtime, act, begin
 from e2efly.runs import presets
+from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
 from e2efly.validation.evaluation import candidate
 from e2efly.vehicles.loading import load_vehicle
@@ -38,7 +39,9 @@ def test_an_entry_is_trained_exported_flown_and_written_as_c(tmp_path: Path, mon
 
     file = made(tmp_path / "policy.onnx", 0.1, env, preset, hidden=8, hovers=False)
     policy, vehicle = load_policy(file), load_vehicle("vis_r")
-    flight = Runtime.of(policy, course_for(policy.contract, vehicle), vehicle, imu=True)
+    flight = Runtime.of(
+        policy, course_for(policy.contract, vehicle, HoverRoute(target=preset.task.target)), vehicle, imu=True
+    )
     v, imu = state.vehicle, state.imu
     at = Odometry(0.0, *(np.asarray(x[1]) for x in (v.position, v.velocity, v.quaternion, v.body_rate)))
     felt = Imu(np.asarray(imu.gyroscope[1]), np.asarray(imu.accelerometer[1]))

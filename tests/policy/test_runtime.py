@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from e2efly.config import EnvConfig, ImuConfig, TaskConfig
+from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
 from e2efly.environment import Env, EnvState, random_key
 from e2efly.learning.onnx_export import contract_of
@@ -27,6 +28,7 @@ from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Envelope, Imu, Runtime, RuntimeState, act, begin, check, due, outside
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
+from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import Route, course_for, fields_of
 from e2efly.tasks.track.goal import TrackRoute
@@ -61,7 +63,7 @@ def policy(hovering: Path) -> Policy:
 
 @pytest.fixture(scope="module")
 def runtime(policy: Policy) -> Runtime:
-    return Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE)
+    return Runtime.of(policy, course_for(policy.contract, VEHICLE, HoverRoute(target=defaults.TARGET)), VEHICLE)
 
 
 def odometry(state: EnvState, row: int, time: float = START) -> Odometry:
@@ -76,14 +78,20 @@ def still(position: Any = (0.0, 0.0, 2.0), **changes: Any) -> Odometry:
     )
 
 
+TRAINED: dict[str, Any] = {"centre": defaults.CENTRE, "radius": defaults.RADIUS}
+
+
 def route_to(task: TaskConfig, state: EnvState, row: int) -> Route | None:
     """The route that leads along what the environment drew."""
     name = task.name
     if name == "track":
         (x, y, _), (vx, _, _) = np.asarray(state.memory.reference.knots)[row, 0, :2] - np.array([[0, 0, 3], [0, 0, 0]])
         if task.reference == "circle":  # type: ignore[union-attr]
-            return TrackRoute(phase=math.atan2(y, x))
-        return TrackRoute(reference="lemniscate", phase=math.atan2(x / 2, vx / (2 * 3 / (2 * math.sqrt(2)))))
+            return TrackRoute(circle_rate=defaults.CIRCLE_RATE, phase=math.atan2(y, x), **TRAINED)
+        phase = math.atan2(x / 2, vx / (2 * 3 / (2 * math.sqrt(2))))
+        return TrackRoute(reference="lemniscate", lemniscate_speed=defaults.LEMNISCATE_SPEED, phase=phase, **TRAINED)
+    if name == "hover":
+        return HoverRoute(target=defaults.TARGET)
     return RaceRoute(laps=0) if name == "race" else None
 
 

@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 
 from e2efly.control import Quat
+from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
 from e2efly.environment import Env, random_key
+from e2efly.flight.pilot.fence import check_course
+from e2efly.flight.settings import Fence
 from e2efly.learning.onnx_export import contract_of
 from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Shape
@@ -25,11 +28,9 @@ from e2efly.tasks import TASKS
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.land.goal import LandRoute
 from e2efly.tasks.race import RaceConfig
-from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.race.world import Race
-from e2efly.tasks.route import course_for, goal_of, route_of
+from e2efly.tasks.route import course_for, goal_notes, goal_of, route_of
 from e2efly.tasks.task import at_rest
-from e2efly.tasks.track.goal import TrackRoute
 from e2efly.validation.starts import course_of
 from e2efly.vehicles.loading import load_vehicle
 
@@ -94,15 +95,47 @@ def through(name: str, count: int, gap: float = 0.2) -> np.ndarray:
     return np.stack([middle - forward, middle + forward], axis=1).reshape(-1, 3)
 
 
-def test_the_defaults_are_the_trainings(contracts: dict[str, Contract]) -> None:
-    hover, track, race = (TASKS[name].training() for name in ("hover", "track", "race"))
-    suites = track.criteria()
-    assert HoverRoute().target == hover.target
-    for name in ("centre", "radius", "circle_rate", "lemniscate_speed"):
-        assert {getattr(suite, name) for suite in suites.values()} == {getattr(TrackRoute(), name)}
-    assert TrackRoute().reference in suites
-    assert RaceRoute().track == race.track
-    assert RaceRoute().laps == next(iter(race.criteria().values())).laps
+@pytest.mark.parametrize(
+    ("task", "options"),
+    [("hover", {}), ("hover_aware", {}), ("land", {}), ("land_visual", {}), ("track", {}),
+     ("track", {"reference": "lemniscate"})],
+)  # fmt: skip
+def test_the_usual_flight_fits_into_a_small_room_and_into_the_training(
+    contracts: dict[str, Contract], task: str, options: dict[str, Any]
+) -> None:
+    """Half a metre to each wall of 4x4 m, and to a ceiling of 2.5 m."""
+    route = route_of(contracts[task])(**options)
+    placed = course_for(contracts[task], VEHICLE, route)
+    check_course(Fence(low=(-1.5, -1.5, 0.2), high=(1.5, 1.5, 2.0)), placed)
+    assert placed.box[1, 2] == defaults.FLOWN_HEIGHT
+    assert goal_notes(contracts[task], route) == []
+
+
+def test_a_course_that_leaves_the_fence_is_refused_with_its_size(contracts: dict[str, Contract]) -> None:
+    """Whatever is outside: a target, an opening's corner, the start; not the pad, which lies under each fence."""
+    fence = Fence(low=(-3.0, -3.0, 0.2), high=(3.0, 3.0, 3.0))
+    for task, options, size in (
+        ("hover", {"target": (0.0, 3.1, 1.2)}, "0.6 x 0.4 x 0.2 m, x 0.00 to 0.60, y 2.70 to 3.10, z 1.00 to 1.20"),
+        ("track", {"radius": 3.5}, "7.0 x 6.9 x 0.0 m"),
+        (
+            "race_clutter",
+            {"track": "room_6", "scale": 1.0, "origin": (0.7, 0.0, 0.0)},
+            "4.8 x 4.4 x 1.4 m, x -1.70 to 3.10",
+        ),
+        ("race", {}, "10.0 x 9.0 x 2.0 m"),
+    ):
+        with pytest.raises(ValueError, match=f"the course needs {size}") as refused:
+            check_course(fence, course(contracts[task], **options))
+        assert "(-3.0, -3.0, 0.2) to (3.0, 3.0, 3.0)" in str(refused.value)
+    check_course(fence, course(contracts["race_clutter"], track="room_6", scale=1.0))
+    check_course(fence, course(contracts["land"], origin=(0.0, 0.0, -0.1)))
+
+
+def test_a_policy_that_commands_positions_flies_where_it_was_trained() -> None:
+    absolute = contract("hover", command_mode="position")
+    assert course_for(absolute, VEHICLE).points == [defaults.TARGET]
+    with pytest.raises(ValueError, match=r"goal\.target is .*1\.2\); accepted: \(0\.0, 0\.0, 3\.0\)"):
+        course_for(absolute, VEHICLE, HoverRoute())
 
 
 def test_every_task_says_what_flight_needs_without_jax() -> None:
@@ -141,7 +174,7 @@ def test_hovering_and_landing(contracts: dict[str, Contract]) -> None:
 def test_a_curve_begins_where_it_is_told_and_is_held_at_its_end(contracts: dict[str, Contract], kind: str) -> None:
     placed = course(contracts["track"], reference=kind, centre=(1.0, 0.0, 2.0), radius=1.5, phase=0.4, duration=7.3)
     flown = Flown(placed, [[0, 0, 1]])
-    rate = 0.2 * np.pi if kind == "circle" else 3.0 / (1.5 * np.sqrt(2))
+    rate = defaults.FLOWN_CIRCLE_RATE if kind == "circle" else defaults.FLOWN_LEMNISCATE_SPEED / (1.5 * np.sqrt(2))
     t = np.array([0.0, 0.33, 5.0, 7.3])
     a = 0.4 + rate * t
     x, y = (np.cos(a), np.sin(a)) if kind == "circle" else (np.sin(a), np.sin(2 * a) / 2)
@@ -318,7 +351,7 @@ def test_gates_are_judged_as_in_training(contracts: dict[str, Contract], name: s
     [
         ("hover", {"target": (0.0, np.nan, 1.0)}, r"goal\.target is \(0.0, nan, 1.0\); accepted: 3 numbers, -1"),
         ("hover", {"target": (0.0, 0.0, 0.0)}, r"goal\.target: its lowest point is 0.000 m"),
-        ("hover", {"origin": (0.0, 0.0, -3.5)}, r"goal\.target: its lowest point is -0.500 m"),
+        ("hover", {"origin": (0.0, 0.0, -1.7)}, r"goal\.target: its lowest point is -0.500 m"),
         ("track", {"reference": "circel"}, "unknown reference 'circel'; did you mean 'circle'"),
         ("track", {"reference": "polynomial"}, "unknown reference 'polynomial'.*or the path of a .csv file"),
         ("track", {"reference": "nowhere.csv"}, "reference 'nowhere.csv' cannot be read"),

@@ -6,11 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.courses.defaults import ROOMS
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.environment import random_key
 from e2efly.tasks.hover import HoverConfig
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.world import Race
+from e2efly.tasks.race_speed import RaceSpeedConfig
 from e2efly.tasks.task import Outcome, Shape, at_rest, make_task
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.world import Track
@@ -96,14 +98,15 @@ def test_crossings() -> None:
 
 def test_starts_are_off_the_ground_and_behind_the_first_gate() -> None:
     for name in track_names():
-        race, track = Race.of(RaceConfig(track=name), SHAPE), load_track(name)
+        radius = RaceSpeedConfig.position if name in ROOMS else RaceConfig.position
+        race, track = Race.of(RaceConfig(track=name, position=radius), SHAPE), load_track(name)
         state, memory = race.start(random_key(0), 500)
         assert np.all(np.asarray(memory) == 0)
         assert np.min(state.position[:, 2]) >= SHAPE.feet_height + 0.3 - 1e-6
         ahead = track.position[0] - np.asarray(state.position)
         assert np.min(ahead @ [np.cos(track.yaw[0]), np.sin(track.yaw[0]), 0]) > 0.5
         offset = np.linalg.norm(np.asarray(state.position) - track.start, axis=-1)
-        assert offset.max() <= 1 + 1e-5
+        assert offset.max() <= radius + 1e-5
 
 
 def test_a_track_needs_two_gates(tmp_path: Path) -> None:

@@ -110,6 +110,17 @@ def test_the_bridge_is_told_the_gates_that_stand_in_the_world(race: tuple[Rehear
     np.testing.assert_allclose(np.float32(given[given.index("--goal.speed") + 1]), wanted.speed[0])
 
 
+def test_a_course_that_the_rooms_fence_does_not_hold_is_refused_with_its_size(
+    race: tuple[RehearsalPlan, Drawn], tmp_path: Path
+) -> None:
+    plan, drawn = race
+    with pytest.raises(ValueError, match=rf"the fence is \(-3.0, .* the course needs {drawn.course.needs}; accepted"):
+        draw(dataclasses.replace(plan, fence=Fence()), 4, tmp_path / "track.toml")
+    low, high = drawn.course.box
+    fits = Fence(low=tuple(low), high=tuple(high))
+    assert draw(dataclasses.replace(plan, fence=fits), 4, tmp_path / "track.toml").course.needs == drawn.course.needs
+
+
 def through_gates(drawn: Drawn, aside: float = 0.0) -> Truth:
     """A path straight through the centres of the gates at 5 m/s, in the room."""
     course = drawn.course
@@ -165,6 +176,10 @@ def test_options_without_effect_are_refused(capsys: pytest.CaptureFixture[str]) 
         (["avoid", "--rehearse", "--pose", "udp:1"], "--pose is udp:1; accepted: left out with --rehearse"),
         (["avoid", "--rehearse", "--pose-delay", "0.5"], "--pose-delay is 0.5; accepted: 0 to 0.2 s"),
         (["avoid", "--rehearse", "--laps", "0"], "--laps is 0; accepted: 1 or more"),
+        (
+            ["avoid", "--rehearse", "--fence-low", "2.9", "0", "0"],
+            "flight.fence.low and flight.fence.high are 2.9 and 3.0",
+        ),
         (["hover", "--rehearse"], "policy hover sees nothing; accepted: a policy with images"),
     ):
         assert run(["hil", *given]) == 2

@@ -72,7 +72,8 @@ def test_the_references_are_the_formulas_of_the_page() -> None:
     w = 3 / (2 * np.sqrt(2)) * t + phase
     eight = np.stack([2 * np.sin(w), np.sin(2 * w), 3 + 0 * w], axis=-1)
     for name, points in (("circle", circle), ("lemniscate", eight)):
-        goal = TrackRoute(reference=name, phase=phase).course(SHAPE, 1 / 30)
+        own = {"circle": {"circle_rate": 0.2 * np.pi}, "lemniscate": {"lemniscate_speed": 3.0}}[name]
+        goal = TrackRoute(reference=name, centre=(0.0, 0.0, 3.0), radius=2.0, phase=phase, **own).course(SHAPE, 1 / 30)
         flown = np.stack([goal.goal.goal(goal.memory, np.array([at]))[0] for at in t])
         assert np.abs(flown - points).max() < 1e-4
 

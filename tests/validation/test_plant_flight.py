@@ -34,7 +34,7 @@ from e2efly.vehicles.loading import load_vehicle
 
 START = RigidState(np.array([0.5, -0.5, 3.2]), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
 SHAPE, PERIOD = Shape(0.05, 0.12), 1 / 30
-GOAL = HoverRoute().course(SHAPE, PERIOD)
+GOAL = HoverRoute(target=(0.0, 0.0, 3.0)).course(SHAPE, PERIOD)
 
 
 class Recorded:

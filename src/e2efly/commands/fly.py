@@ -32,6 +32,7 @@ from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
 from e2efly.flight.log_record import Log, Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
+from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
@@ -44,7 +45,7 @@ from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.runtime import Envelope, Runtime, check
 from e2efly.policy.worker import PolicyWorker
-from e2efly.policy.zoo import policy_file
+from e2efly.policy.zoo import FOLDER, policy_file
 from e2efly.runs.rundir import run_of
 from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
 from e2efly.vehicles.loading import load_vehicle
@@ -161,6 +162,20 @@ class _Prepared:
         return self.runtime.policy.contract if self.runtime else None
 
 
+def _chosen(options: Fly, console: Terminal) -> tuple[Path | None, Route | None]:
+    """The file of the policy, and where it flies. The options may need the zoo's policy of another task."""
+    if options.policy is None:
+        return None, options.goal
+    file = policy_file(options.policy, options.vehicle)
+    other = options.goal.instead if options.goal else None
+    if other is None or file.parent.parent != FOLDER:
+        return file, options.goal
+    name = f"{file.parent.name}/{other}"
+    console.print(f"{name} flies in place of {file.parent.name}/{file.stem}, as the options of the goal require.")
+    file = policy_file(name)
+    return file, route_of(load_policy(file).contract)(**vars(options.goal))
+
+
 def _prepared(options: Fly, console: Terminal) -> _Prepared:
     """Check the options, and load what they name."""
     settings = options.flight
@@ -168,7 +183,7 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
         raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
     excited = options.policy == Path(EXCITATION)
-    policy = None if options.policy is None or excited else policy_file(options.policy, options.vehicle)
+    policy, goal = (None, None) if excited else _chosen(options, console)
     loaded = None if policy is None else load_policy(policy)
     if options.commands is not None and options.policy is not None:
         accepted = "one of them: either a policy flies, or another program"
@@ -194,8 +209,10 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
     if loaded is not None:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
-        course = course_for(loaded.contract, body, options.goal)
-        for line in (*loaded.contract.differences(body), *goal_notes(loaded.contract, options.goal)):
+        course = course_for(loaded.contract, body, goal)
+        check_course(settings.fence, course)
+        said = (*loaded.contract.differences(body), f"The course needs {course.needs}.")
+        for line in (*said, *goal_notes(loaded.contract, goal)):
             console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:

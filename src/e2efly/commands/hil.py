@@ -17,8 +17,10 @@ from e2efly.commands.policies import Asked, asked_of
 from e2efly.commands.terminal import Terminal
 from e2efly.config.storage import write_json
 from e2efly.courses.origin import Origin
+from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.process import be_punctual, raise_at_interrupt
-from e2efly.tasks.route import route_of
+from e2efly.flight.settings import Fence, check_fence
+from e2efly.tasks.route import course_for, route_of
 from e2efly.validation.processes import flags
 from e2efly.vehicles.loading import load_vehicle
 
@@ -64,8 +66,9 @@ def run(asked: Asked) -> int:
     if o.seconds is not None and not o.seconds > 0:
         raise ValueError(f"--seconds is {o.seconds}; accepted: more than 0")
     origin = Origin(o.origin, o.origin_yaw) if o.points is None else _measured(o.points)
+    fence = _fence(o)
     if o.rehearse:
-        return rehearse(o, asked.task, origin)
+        return rehearse(o, asked.task, origin, fence)
     from e2efly.flight.child import Child
     from e2efly.flight.pose.sources import open_source
     from e2efly.flight.sight.outputs import give, outputs
@@ -92,10 +95,14 @@ def run(asked: Asked) -> int:
         scenery = Scenery.draw(found.environment(suite), o.seed)
     assert scenery is not None
     scenery = _where(o, scenery, found.policy.contract.task, float(body.radius), console)
-    goal = flags("goal", dataclasses.replace(
+    route = dataclasses.replace(
         route_of(found.policy.contract).drawn(scenery.course, o.track),
         origin=origin.position, origin_yaw=origin.yaw, outside=bool(found.outside),
-    ))  # fmt: skip
+    )  # fmt: skip
+    course = course_for(found.policy.contract, body, route)
+    if fence is not None:
+        check_course(fence, course)
+    goal = flags("goal", route) + ([] if fence is None else flags("flight.fence", fence))
     with ExitStack() as stack:
         source = open_source(o.pose)
         stack.callback(source.close)
@@ -125,6 +132,7 @@ def run(asked: Asked) -> int:
         node.warm()
         be_punctual(PRIORITY)
         source.read(time.monotonic())  # what came while it compiled is old
+        console.print(f"The course needs {course.needs}.")
         console.print(f"{rate:g} Hz, poses from {source.describe()}. Fly it with:")
         console.print(f"  {' '.join([*goal, *given])}")
         try:
@@ -138,6 +146,15 @@ def run(asked: Asked) -> int:
             measured = {"began": node.began, "pose_to_image_s": node.latencies, "collisions": node.collisions}
             write_json(o.json, measured)
     return 0
+
+
+def _fence(o: Hil) -> Fence | None:
+    """The fence that the options give. None: they give none."""
+    if o.fence_low is None and o.fence_high is None:
+        return None
+    fence = Fence(o.fence_low or Fence().low, o.fence_high or Fence().high)
+    check_fence(fence)
+    return fence
 
 
 def _where(o: Hil, scenery: "Scenery", task: str, radius: float, console: Terminal) -> "Scenery":

@@ -16,6 +16,7 @@ from e2efly.config.budget import check_time
 from e2efly.config.storage import held, write_json
 from e2efly.courses.origin import Origin
 from e2efly.flight.process import raise_at_interrupt
+from e2efly.flight.settings import Fence
 
 if TYPE_CHECKING:
     from e2efly.validation.hil_lap import Lap, Spread
@@ -56,13 +57,14 @@ def check_rehearsal(o: Hil) -> None:
     check_time({f"--laps is {o.laps}": o.laps * LAP_S}, f"at {LAP_S:g} s each")
 
 
-def rehearse(o: Hil, task: dict[str, Any], origin: Origin) -> int:
+def rehearse(o: Hil, task: dict[str, Any], origin: Origin, fence: Fence | None) -> int:
     """Fly, print a table, and write a report and pictures.
 
     Args:
         o: the options.
         task: values of the task that differ from the policy's own, by dotted name.
         origin: position and turn of the world's origin in the room.
+        fence: the fence of the room. None: it is far away.
 
     Returns:
         0, or 1 when a flight did not go as required.
@@ -86,7 +88,7 @@ def rehearse(o: Hil, task: dict[str, Any], origin: Origin) -> int:
     for note in found.notes:
         console.print(note, style="dim")
     world = flags("task", found.task, candidate(o.policy, o.vehicle).task)
-    plan = RehearsalPlan(found, origin, o.rate, o.pose_delay, o.link_delay, world)
+    plan = RehearsalPlan(found, origin, o.rate, o.pose_delay, o.link_delay, world, fence=fence)
     if o.scene is not None:
         plan = replace(plan, scene=SceneFile(o.scene, o.scene_unit, o.scene_up, o.scene_materials, o.beside))
     if not plan.found.policy.contract.images:

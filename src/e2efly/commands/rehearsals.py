@@ -2,12 +2,16 @@
 
 import dataclasses
 import math
+import tempfile
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from e2efly.flight.settings import Fence
+from e2efly.tasks.route import Route, route_of
 from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import Candidate
 from e2efly.validation.rehearsal import Rehearsal, rehearse
@@ -15,23 +19,38 @@ from e2efly.validation.scenery import Scenery
 from e2efly.vehicles.vehicle import Vehicle
 
 
-def fly_whole(found: Candidate, vehicle: Vehicle, count: int, console: Console, seed: int = 0) -> list[Rehearsal]:
+def fly_whole(
+    found: Candidate,
+    vehicle: Vehicle,
+    count: int,
+    console: Console,
+    seed: int = 0,
+    *,
+    route: Route | None = None,
+    fence: Fence | None = None,
+) -> list[Rehearsal]:
     """Take off, hover, hand over to the policy, and land: the given number of flights, each from another place.
 
     A policy with cameras flies in another world each time. The worlds come from the training environment of the first
-    criterion.
+    criterion, and so do the courses. Other policies fly the course of the route, or else the usual one.
 
     Raises:
+        ValueError: for a course that the fence does not hold.
         OSError: when the firmware cannot be built or started.
     """
+    kind = route_of(found.policy.contract)
     suite = next(iter(found.task.criteria().values()))
     env = found.environment(suite) if found.policy.contract.images else None
     built, flights = firmware_program.chosen(), []
-    with console.status("whole flights through the firmware") as status:
+    with console.status("whole flights through the firmware") as status, tempfile.TemporaryDirectory() as folder:
         for i in range(count):
             status.update(f"whole flight {i + 1} of {count} through the firmware")
             scenery = None if env is None else Scenery.draw(env, seed + i)
-            flights.append(rehearse(built, found.policy, vehicle, seed=seed + i, scenery=scenery))
+            if scenery is not None:
+                route = dataclasses.replace(kind.drawn(scenery.course, Path(folder) / "track.toml"), outside=True)
+            flights.append(
+                rehearse(built, found.policy, vehicle, seed=seed + i, scenery=scenery, route=route, fence=fence)
+            )
     return flights
 
 

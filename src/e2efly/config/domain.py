@@ -1,5 +1,6 @@
 """The domain of a policy: the ranges of the courses and worlds that it was trained for. Imports no JAX."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -96,4 +97,19 @@ def track_domain(track: Any) -> Domain:
         extent("gate_bearing", "rad", bearing),
         extent("gate_turn", "rad", turn),
         extent("start_distance", "m", np.linalg.norm(position[0] - track.start)),
+    )
+
+
+def displaced(tracks: Domain, moved: float, turned: float) -> Domain:
+    """The quantities of tracks whose gates are displaced by up to so much, m per axis, and turned, rad."""
+    nearest = next(part.low for part in tracks if part.name == "gate_distance")
+    aside = math.asin(min(2 * math.sqrt(2) * moved / nearest, 1.0))  # by which the way to the next gate turns
+    more = {
+        "gate_altitude": moved, "gate_rise": 2 * moved, "gate_distance": 2 * math.sqrt(3) * moved,
+        "start_distance": math.sqrt(3) * moved, "gate_turn": 2 * turned, "gate_bearing": turned + aside,
+    }  # fmt: skip
+    return tuple(
+        Extent(part.name, part.unit, round(part.low - wider, 6), round(part.high + wider, 6))
+        for part in tracks
+        for wider in (more.get(part.name, 0.0),)
     )

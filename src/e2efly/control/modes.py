@@ -118,7 +118,8 @@ COMMAND_MODES: dict[str, CommandMode] = {
         ),
         CommandMode(
             "position", ("x", "y", "z", "yaw"), ("m", "m", "m", "rad"),
-            lambda _, reach: _symmetric(reach, reach, reach, np.pi), position, fixed=("origin", "origin_yaw", "pad"),
+            lambda _, reach: _symmetric(reach, reach, reach, np.pi), position,
+            fixed=("origin", "origin_yaw", "pad", "target", "centre"),
         ),
     )
 }  # fmt: skip

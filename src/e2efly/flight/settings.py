@@ -113,7 +113,7 @@ def check(settings: FlightSettings) -> None:
     """
     _check_channels(settings.channels)
     check_fields("flight", settings)
-    _check_fence(settings.fence)
+    check_fence(settings.fence)
     low, high = settings.fence.low[2], settings.fence.high[2]
     if not low < settings.ground_height + settings.takeoff_height < high:
         raise ValueError(
@@ -122,7 +122,12 @@ def check(settings: FlightSettings) -> None:
         )
 
 
-def _check_fence(fence: Fence) -> None:
+def check_fence(fence: Fence) -> None:
+    """Refuse a fence in which no vehicle could fly.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted.
+    """
     for axis, low, high in zip("xyz", fence.low, fence.high, strict=True):
         if high - low < SMALLEST:
             said = f"flight.fence.low and flight.fence.high are {low} and {high} in {axis}"

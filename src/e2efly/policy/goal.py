@@ -200,10 +200,23 @@ class Course:
     goal."""
     duration: float = np.inf
     """Time after which the task is over, s."""
-    lowest: float = np.inf
-    """Lowest height in the course, in the task's world, m."""
+    points: Any = ()
+    """(..., 3) points that the vehicle has to come to, in the task's world, m: targets, and corners of gates."""
     clearance: float | None = None
-    """Smallest distance required between this height and the ground, m. None: the height of the centre of mass above
-    the feet."""
+    """Smallest height required of the points above the ground, m. None: the height of the centre of mass above the
+    feet."""
     origin: Origin = Origin()
     """Origin of the task's world in the room."""
+
+    @property
+    def box(self) -> np.ndarray:
+        """(2, 3) smallest and largest x, y, z in the room, m, of the points and of the start."""
+        inside = self.origin.points(np.concatenate([np.reshape(self.start, (1, 3)), np.reshape(self.points, (-1, 3))]))
+        return np.stack([inside.min(0), inside.max(0)])
+
+    @property
+    def needs(self) -> str:
+        """The size of the box, and where it lies in the room, as text."""
+        low, high = self.box
+        size = " x ".join(f"{length:.1f}" for length in high - low)
+        return f"{size} m, " + ", ".join(f"{k} {a:.2f} to {b:.2f}" for k, a, b in zip("xyz", low, high, strict=True))

@@ -1,9 +1,12 @@
 """Where a policy is to fly: options of `e2efly fly`, and the course that follows from them. Imports no JAX."""
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+
+import numpy as np
 
 from e2efly.config import TaskConfig, check_fields, number
 from e2efly.config.domain import Domain
@@ -28,7 +31,7 @@ def place(default: Any) -> Any:
 
 @dataclass(frozen=True)
 class Route:
-    """Where a policy is to fly. The defaults are those of the training."""
+    """Where a policy is to fly. The defaults fit into a room where the task has such a course."""
 
     longest_s: ClassVar[float] = 10.0
     """Longest flight of the policy in a rehearsal, s."""
@@ -36,6 +39,8 @@ class Route:
     """Name of the option that sets the height of the course."""
     whole: ClassVar[dict[str, Any]] = {}
     """Options of a rehearsal that replace the defaults."""
+    trained: ClassVar[dict[str, Any]] = {}
+    """Options that place the course of the training, where the defaults place another."""
 
     origin: tuple[float, float, float] = place((0.0, 0.0, 0.0))
     """Position of the task's origin in the room (the world of the pose source), m."""
@@ -44,6 +49,16 @@ class Route:
 
     outside: bool = False
     """Fly a course also if it lies outside of the ranges that the policy was trained for."""
+
+    @property
+    def instead(self) -> str | None:
+        """The task whose policy of the zoo flies these options. None: this task."""
+        return None
+
+    @property
+    def notes(self) -> list[str]:
+        """What is to be said of the options before every flight."""
+        return []
 
     def domain(self) -> Domain:
         """The quantities of the course, named as in `TaskConfig.domain`."""
@@ -93,6 +108,12 @@ def route_of(contract: Contract) -> type[Route]:
     return route
 
 
+def usual_route(contract: Contract) -> Route:
+    """The route that a policy flies unless another is given."""
+    kind, fixed = route_of(contract), COMMAND_MODES[contract.action.mode].fixed
+    return kind(**{name: value for name, value in kind.trained.items() if name in fixed})
+
+
 def goal_of(task: type[TaskConfig]) -> type[Goal]:
     """The class that computes a policy's task observation and judges it.
 
@@ -127,16 +148,16 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:
-    """The course that a policy was trained to fly, at the place that the options give.
+    """The course that a policy is to fly, at the place that the options give.
 
-    Without a route, it is where the training was. The vehicle matters by its feet height and its size.
+    Without a route, it is the usual one. The vehicle matters by its feet height and its size.
 
     Raises:
         ValueError: naming the option, its value and what is accepted: a number out of range, an option without effect,
             a goal under the ground, a course that does not exist or is broken, or that the policy was not trained for.
     """
     kind = route_of(contract)
-    route = kind() if route is None else route
+    route = usual_route(contract) if route is None else route
     if not isinstance(route, kind):
         raise ValueError(f"goal is a {type(route).__name__}; accepted: a {kind.__name__}, for task {contract.task!r}")
     check_fields("goal", route)
@@ -148,7 +169,7 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
     if not route.outside and (reasons := contract.outside(route.domain())):
         raise ValueError("\n".join([*(f"goal: {reason}" for reason in reasons), ANYWAY]))
     least = vehicle.feet_height if course.clearance is None else course.clearance
-    height = course.lowest + placed.origin.position[2]
+    height = float(placed.origin.points(np.reshape(course.points, (-1, 3)))[:, 2].min(initial=math.inf))
     if height < least:
         raise ValueError(
             f"goal.{route.height}: its lowest point is {height:.3f} m over the ground of the room, with goal.origin; "
@@ -158,10 +179,11 @@ def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None)
 
 
 def goal_notes(contract: Contract, route: Route | None) -> list[str]:
-    """What is to be said of a course that is flown although the policy was not, or may not be, trained for it."""
+    """What is to be said of a course: of its options, and if the policy was not, or may not be, trained for it."""
+    route = usual_route(contract) if route is None else route
     if contract.courses is None:
-        return [UNDECLARED]
-    return [f"Outside of the training: {text}." for text in contract.outside(() if route is None else route.domain())]
+        return [*route.notes, UNDECLARED]
+    return [*route.notes, *(f"Outside of the training: {text}." for text in contract.outside(route.domain()))]
 
 
 def _check_use(contract: Contract, route: Route) -> None:
@@ -175,9 +197,9 @@ def _check_use(contract: Contract, route: Route) -> None:
     # a policy knows its position only relative to its goal: commands in world axes refer to the world of its training
     mode = contract.action.mode
     for name in COMMAND_MODES[mode].fixed:
-        if name in changed:
-            default = type(route).__dataclass_fields__[name].default
+        value, default = (getattr(x, name, None) for x in (route, usual_route(contract)))
+        if value != default:
             raise ValueError(
-                f"goal.{name} is {changed[name]!r}; accepted: {default!r}, as the policy commands {mode} in the world "
+                f"goal.{name} is {value!r}; accepted: {default!r}, as the policy commands {mode} in the world "
                 "of its training: give the pose source that origin instead"
             )

@@ -28,6 +28,8 @@ from e2efly.vehicles.vehicle import Vehicle
 
 CONTROL_HZ = 100.0
 """Lowest rate of the bridge, Hz."""
+REACH = 20.0
+"""Usual size of the fence about the origin, m."""
 PATIENCE_S = 60.0
 """Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
 
@@ -182,12 +184,13 @@ def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], 
     return False
 
 
-def rehearsal_settings(height: float, reach: float = 20.0) -> FlightSettings:
+def rehearsal_settings(height: float, reach: float = REACH, fence: Fence | None = None) -> FlightSettings:
     """Settings of whole flights on the rig, at this height above the ground, m. The firmware on the rig has no battery.
 
-    `reach` is the radius of the fence about the origin, m.
+    `reach` is the radius of the fence about the origin, m, if no fence is given.
     """
-    fence = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
+    wide = Fence(low=(-reach, -reach, 0.1), high=(reach, reach, 8.0), speed=20.0, tilt=3.1, braking=12.0)
     return dataclasses.replace(
-        FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True, fence=fence,
+        FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True,
+        fence=fence or wide,
     )  # fmt: skip

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.flight.log_record import Log
+from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.flight_state import Mode, Reason
+from e2efly.flight.settings import Fence
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.runtime import Acting, RuntimeState
-from e2efly.tasks.route import course_for, route_of
-from e2efly.validation.bridge_session import FlownSession, Session, rehearsal_settings
+from e2efly.tasks.route import Route, course_for, route_of, usual_route
+from e2efly.validation.bridge_session import REACH, FlownSession, Session, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
@@ -64,10 +66,10 @@ class Rehearsal:
     """The record of the flight."""
 
 
-def whole_course(policy: Acting, vehicle: Vehicle) -> Course:
-    """The course of a policy in a rehearsal: the usual one of its task, wherever it was trained."""
-    kind = route_of(policy.contract)
-    return course_for(policy.contract, vehicle, kind(outside=True, **kind.whole))
+def whole_course(policy: Acting, vehicle: Vehicle, route: Route | None = None) -> Course:
+    """The course of a policy in a rehearsal. Without a route, the usual one of its task, wherever it was trained."""
+    usual = usual_route(policy.contract)
+    return course_for(policy.contract, vehicle, route or dataclasses.replace(usual, outside=True, **usual.whole))
 
 
 def rehearse(
@@ -78,19 +80,27 @@ def rehearse(
     seed: int = 0,
     log: Log | None = None,
     scenery: Scenery | None = None,
+    route: Route | None = None,
+    fence: Fence | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
 ) -> Rehearsal:
     """Fly one whole flight. The vehicle is that of the world and of the bridge.
 
-    `scenery` is the world that a policy sees. `wrap` puts a wrapper between each camera and the bridge.
+    `scenery` is the world that a policy sees. `wrap` puts a wrapper between each camera and the bridge. Without a
+    `route` the course is the usual one, without a `fence` the fence is far away.
+
+    Raises:
+        ValueError: for a course that the fence does not hold.
     """
-    course = whole_course(policy, vehicle)
+    course = whole_course(policy, vehicle, route)
     course = course if scenery is None else scenery.on(course)
+    if fence is not None:
+        check_course(fence, course)
     with tempfile.TemporaryDirectory(prefix="e2efly-") as temporary:
         latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
         with Rig(firmware, Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
-            flight = _fly(rig, policy, course, seed, log, [wrap(source) for source in sources])
+            flight = _fly(rig, policy, course, seed, log, [wrap(source) for source in sources], fence)
     return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
 
 
@@ -106,15 +116,16 @@ def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) 
 
 
 def _fly(
-    rig: Rig, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource]
-) -> Rehearsal:
+    rig: Rig, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
+    fence: Fence | None,
+) -> Rehearsal:  # fmt: skip
     random = np.random.default_rng(seed)
     first = course.origin.points(course.start)
     x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)
     rig.state = rig.world.at_rest(x, y, _heading(course, random))
     rig.sleep(0.5)
     height = first[2] - rig.world.vehicle.feet_height
-    settings = rehearsal_settings(height, REACH_IN_SIGHT) if cameras else rehearsal_settings(height)
+    settings = rehearsal_settings(height, REACH_IN_SIGHT if cameras else REACH, fence)
     session = Session(rig, settings, policy=policy, course=course, log=log, cameras=cameras)
     try:
         up = session.take_off(3.0)

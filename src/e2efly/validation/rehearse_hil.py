@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.courses.origin import Origin
+from e2efly.flight.pilot.fence import check_course
+from e2efly.flight.settings import Fence
 from e2efly.flight.sight.shared import place
 from e2efly.policy.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
@@ -82,6 +84,8 @@ class RehearsalPlan:
     """Further options of `e2efly fly`."""
     scene: SceneFile | None = None
     """The scene that is shown in place of the task's world."""
+    fence: Fence | None = None
+    """The fence of the room. None: it is far away."""
 
     @property
     def vehicle(self) -> Vehicle:
@@ -118,8 +122,8 @@ def draw(plan: RehearsalPlan, seed: int, track: Path) -> Drawn:
     Gates that the task draws are written to `track`, a .toml file.
 
     Raises:
-        ValueError: for a policy without images, for a scene in which the course cannot begin, and for a task whose
-            options cannot describe the course that was drawn.
+        ValueError: for a policy without images, for a scene in which the course cannot begin, for a task whose options
+            cannot describe the course that was drawn, and for a course that the fence does not hold.
     """
     found, contract = plan.found, plan.found.policy.contract
     scenery = Scenery.draw(found.environment(next(iter(found.task.criteria().values()))), seed)
@@ -140,6 +144,8 @@ def draw(plan: RehearsalPlan, seed: int, track: Path) -> Drawn:
     if not np.allclose(own, wanted, atol=1e-3):
         said = f"goal of task {contract.task!r} was drawn at {wanted[0].tolist()} m"
         raise ValueError(f"{said}, but options of `e2efly fly` lead to {own[0].tolist()}; accepted: a task with both")
+    if plan.fence is not None:
+        check_course(plan.fence, course)
     return Drawn(scenery, route, course)
 
 
@@ -220,7 +226,7 @@ class _Flight:
         self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
         stack.enter_context(self.room)
         link = None if plan.radio == 0.0 else self._radio(stack)
-        settings = rehearsal_settings(self._height(), REACH_IN_SIGHT)
+        settings = rehearsal_settings(self._height(), REACH_IN_SIGHT, plan.fence)
         options = [*flags("flight", settings), *images, "--envelope.speed", "8"]
         options += [*flags("goal", drawn.route), *flies, *plan.options]
         log = folder / "flight.mcap"

@@ -33,6 +33,13 @@ class RaceTrack:
     opening: np.ndarray
     """(gates, 2) inner width and height."""
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(gates, 4, 3) corners of the openings."""
+        left = np.stack([-np.sin(self.yaw), np.cos(self.yaw), 0 * self.yaw], axis=-1) * self.opening[:, :1] / 2
+        up = np.array([0.0, 0.0, 0.5]) * self.opening[:, 1:]
+        return np.stack([self.position + a * left + b * up for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1)
+
     def enlarged(self, scale: float) -> "RaceTrack":
         """The track with its ground plan enlarged. Heights and openings stay the same."""
         size = np.array([scale, scale, 1.0])

@@ -7,6 +7,7 @@ import numpy as np
 from e2efly.control import Quat, Vec3
 from e2efly.flight.pilot.flight_state import Pilot, Reason, Target
 from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.policy.goal import Course
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -44,6 +45,21 @@ def fence_problem(
         if guard and not low <= stop <= high:
             return f"{Reason.GUARD}: {axis} would reach {stop:.2f} m; accepted: {low:g} to {high:g}"
     return None
+
+
+def check_course(fence: Fence, course: Course) -> None:
+    """Refuse a course that a fence does not hold. A course that ends on the ground may lead below it.
+
+    Raises:
+        ValueError: naming the fence, what the course needs, and what is accepted.
+    """
+    low, high = course.box
+    under = (low < fence.low) & ~np.array([False, False, course.goal.lands])
+    if (under | (high > fence.high)).any():
+        raise ValueError(
+            f"the fence is {fence.low} to {fence.high} m; the course needs {course.needs}; accepted: a fence that "
+            "holds it (--flight.fence.low, --flight.fence.high), or a course that is smaller or elsewhere"
+        )
 
 
 def here(odometry: Odometry) -> Target:

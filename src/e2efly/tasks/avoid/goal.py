@@ -117,4 +117,10 @@ class AvoidRoute(Route):
         """The course along the lane, with the heading of the lane."""
         config = AvoidConfig()
         goal, start = AvoidGoal(config, shape, control_period, 1), np.array([0.0, 0.0, config.altitude])
-        return Course(goal, AvoidMemory(np.array([self.speed])), start, heading=0.0, lowest=config.altitude)
+        return Course(
+            goal,
+            AvoidMemory(np.array([self.speed])),
+            start,
+            heading=0.0,
+            points=[(config.forest.length, 0.0, config.altitude)],
+        )

@@ -190,5 +190,6 @@ class GapRoute(Route):
         memory = GapMemory(np.array([self.slit]), turn, np.zeros(1, bool))
         ahead = np.array([math.cos(self.slit_yaw), math.sin(self.slit_yaw), 0.0])
         start = np.asarray(self.slit) - self.before * ahead
-        lowest = self.slit[2] - goal.config.opening[0] / 2
-        return Course(goal, memory, start, heading=self.slit_yaw, lowest=lowest, clearance=0.0)
+        below = np.asarray(self.slit) - (0.0, 0.0, goal.config.opening[0] / 2)
+        points = [below, self.slit + goal.config.beyond * ahead]
+        return Course(goal, memory, start, heading=self.slit_yaw, points=points, clearance=0.0)

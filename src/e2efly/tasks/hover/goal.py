@@ -68,12 +68,13 @@ class HoverRoute(Route):
     """Where to hover."""
 
     longest_s: ClassVar = 8.0
+    trained: ClassVar = {"target": defaults.TARGET}
 
-    target: tuple[float, float, float] = place(defaults.TARGET)
+    target: tuple[float, float, float] = place((0.0, 0.0, defaults.FLOWN_HEIGHT))
     """Point to hover at, m."""
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the target. It has no end."""
         goal = HoverGoal(dataclasses.replace(HoverConfig(), target=self.target), shape, control_period)
-        start = np.add(self.target, (1.0, -0.5, -1.0))
-        return Course(goal, np.zeros(1), start, duration=math.inf, lowest=self.target[2])
+        start = np.add(self.target, (0.6, -0.4, -0.2))
+        return Course(goal, np.zeros(1), start, duration=math.inf, points=[self.target])

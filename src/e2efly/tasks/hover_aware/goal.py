@@ -127,10 +127,11 @@ class HoverAwareRoute(Route):
     """Where to hover, and what to look at."""
 
     longest_s: ClassVar = 8.0
+    trained: ClassVar = {"target": defaults.TARGET}
 
-    target: tuple[float, float, float] = place(defaults.TARGET)
+    target: tuple[float, float, float] = place((0.0, 0.0, defaults.FLOWN_HEIGHT))
     """Point to hover at, m."""
-    look_at: tuple[float, float, float] = place((5.0, 0.0, 3.0))
+    look_at: tuple[float, float, float] = place((5.0, 0.0, defaults.FLOWN_HEIGHT))
     """Position of the object to look at when the policy takes over, m."""
     turn_rate: float = place(0.0)
     """Rate at which the object circles around the target, rad/s."""
@@ -150,5 +151,5 @@ class HoverAwareRoute(Route):
             centre=np.array([[*self.target[:2], self.target[2] + z]]), away=np.array([math.hypot(x, y)]),
             angle=np.array([math.atan2(y, x)]), rate=np.array([self.turn_rate]), time=np.zeros(1), held=np.zeros(1),
         )  # fmt: skip
-        start = np.add(self.target, (0.5, -0.5, -0.5))
-        return Course(HoverAwareGoal(config, shape, control_period), memory, start, lowest=self.target[2])
+        start = np.add(self.target, (0.5, -0.5, -0.2))
+        return Course(HoverAwareGoal(config, shape, control_period), memory, start, points=[self.target])

@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
+from e2efly.courses import defaults
 from e2efly.courses.origin import Origin
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
@@ -111,6 +112,6 @@ class LandRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        start = np.array([1.0, 0.5, 2.0])
+        start = np.array([0.6, 0.4, defaults.FLOWN_HEIGHT])
         goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)
-        return Course(goal, np.zeros((1, 0)), start, lowest=math.inf, origin=pad)
+        return Course(goal, np.zeros((1, 0)), start, points=np.zeros(3), clearance=-math.inf, origin=pad)

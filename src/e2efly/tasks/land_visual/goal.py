@@ -1,11 +1,13 @@
 """Visual landing: the goal, and the route of a flight. Imports no JAX."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from e2efly.control.vectors import Array, namespace
+from e2efly.courses import defaults
 from e2efly.courses.origin import Origin
 from e2efly.policy.goal import Course, Outcome, Shape
 from e2efly.policy.observation import Field
@@ -68,5 +70,6 @@ class LandVisualRoute(LandRoute):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        start = np.array([0.5, 0.3, 2.0])
-        return Course(LandVisualGoal(LandVisualConfig(), shape), np.zeros((1, 0)), start, origin=Origin(self.pad))
+        start = np.array([0.6, 0.4, defaults.FLOWN_HEIGHT])
+        goal, pad = LandVisualGoal(LandVisualConfig(), shape), Origin(self.pad)
+        return Course(goal, np.zeros((1, 0)), start, points=np.zeros(3), clearance=-math.inf, origin=pad)

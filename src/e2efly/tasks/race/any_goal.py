@@ -1,6 +1,7 @@
 """Racing on any track: the goal of policies whose observation describes the gates fully. Imports no JAX."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,17 +16,21 @@ from e2efly.tasks.verdicts import distance, offsets
 
 SHOWN = 3
 """Number of gates that the policy observes."""
+BEHIND = 0.3
+"""Distance behind a gate of the point to which a commanded velocity is directed, m."""
 HIGHEST = 3.0
 """Limit of the observed height above the ground, m."""
 
 
 @dataclass(frozen=True)
 class AnyRaceMemory:
-    """The track of each vehicle, and the number of gates that it has passed."""
+    """The track of each vehicle, the number of gates that it has passed, and its commanded speed."""
 
     tracks: Tracks
     passed: Array
     """(n,) gates passed."""
+    speed: Array | float = math.inf
+    """(n,) commanded speed, m/s. Infinite: as fast as it can."""
 
     @property
     def index(self) -> Array:
@@ -60,6 +65,16 @@ class Ahead:
         found = xp.take_along_axis(table, row[..., None], axis=1)
         axis = xp.concatenate([found[..., 3:5], xp.zeros_like(found[..., :1])], axis=-1)
         return Ahead(found[..., :3] + STRAIGHT_ON * beyond[..., None] * axis, axis, found[..., 5:])
+
+
+def towards(memory: AnyRaceMemory, body: Any, speed: Array) -> Array:
+    """(n, 3) a velocity, world, m/s, to a point close behind the next gate, at a speed (n,).
+
+    In the middle of the gate it still points straight through.
+    """
+    ahead = Ahead.of(memory)
+    away = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0] - body.position
+    return speed[:, None] * away / (namespace(away).linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,17 @@
-"""Racing on any track: a random track for each episode (`courses/random_tracks.py`), or a given track for all."""
+"""Racing on any track: a random track for each episode (`courses/random_tracks.py`), or a given track for all.
+
+Racing on one of several given tracks, whose gates are displaced in every episode, begins here, too.
+"""
 
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.courses.gates import Tracks
@@ -25,7 +30,7 @@ from e2efly.tasks.task import at_rest, into_ball, uniform
 LOWEST_START = 0.3
 """Smallest height of the feet above the ground in a start, m."""
 
-jax.tree_util.register_dataclass(AnyRaceMemory, data_fields=["tracks", "passed"], meta_fields=[])
+jax.tree_util.register_dataclass(AnyRaceMemory, data_fields=["tracks", "passed", "speed"], meta_fields=[])
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])
@@ -60,7 +65,7 @@ class AnyRace(AnyRaceGoal):
             tracks = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x), (n, *x.shape[1:])), self.given)
         g = tracks.gates
         state = begun(state_key, n, self.config.position, self.shape, g.start, g.start_yaw)
-        return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32))
+        return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32), jnp.full(n, jnp.inf))
 
     def scene(self, memory: AnyRaceMemory) -> Scene:
         """The gates over level ground."""
@@ -94,3 +99,53 @@ def begun(key: PRNGKeyArray, n: int, radius: Any, shape: Shape, place: Any, head
     position = position.at[:, 2].max(shape.feet_height + LOWEST_START)
     zero = jnp.zeros(n)
     return dataclasses.replace(at_rest(position), quaternion=from_euler(zero, zero, zero + heading))
+
+
+def several(names: tuple[str, ...], scale: float = 1.0) -> Tracks:
+    """Tracks with enlarged ground plans, one in each world, in arrays for as many gates as the longest has.
+
+    Raises:
+        ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, and for a
+            name given twice.
+    """
+    if isinstance(names, str) or not names:
+        raise ValueError(f"task.track is {names!r}; accepted: a tuple of one or more tracks")
+    if len({Path(name).stem for name in names}) < len(names):
+        raise ValueError(f"task.track is {names}; accepted: tracks of different names, which tell the criteria")
+    tracks = [load_track(name).enlarged(scale) for name in names]
+    room = max(len(track.yaw) for track in tracks)
+    return jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
+
+
+def displaced(key: PRNGKeyArray, n: int, given: Tracks, moved: Any, turned: Any, only: Any = -1.0) -> Tracks:
+    """One of the given tracks for each of n worlds, with every gate slightly displaced.
+
+    Args:
+        key: for the draws.
+        n: number of worlds.
+        given: the tracks.
+        moved: half-width of each gate's offset, m per axis.
+        turned: half-width of each gate's rotation, rad.
+        only: number of the track that every world has. -1: any of them.
+    """
+    track_key, gate_key = jax.random.split(key)
+    which = jax.random.randint(track_key, (n,), 0, given.count.shape[0])
+    which = jnp.where(only < 0, which, jnp.asarray(only).astype(jnp.int32))
+    tracks = jax.tree.map(lambda x: jnp.asarray(x)[which], given)
+    g, count = tracks.gates, given.gates.count
+    u = uniform(gate_key, n, 4 * count).reshape(n, count, 4)
+    move, turn = moved * u[..., :3], turned * u[..., 3]
+    cos, sin = jnp.cos(turn), jnp.sin(turn)
+    gates = dataclasses.replace(
+        g,
+        position=g.position.at[:, :-1].add(move),
+        cos=g.cos * cos - g.sin * sin,
+        sin=g.sin * cos + g.cos * sin,
+    )
+    return dataclasses.replace(tracks, gates=gates)
+
+
+def between(ends: tuple[Any, Any], u: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Uniform numbers in [-1, 1] as uniform numbers between two ends."""
+    low, high = ends
+    return (low + high) / 2 + (high - low) / 2 * u

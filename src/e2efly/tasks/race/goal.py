@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.config.domain import Domain, track_domain
+from e2efly.config.numbers import SPEED
 from e2efly.config.tables import LARGEST
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
@@ -94,7 +95,7 @@ class RaceGoal(Racing):
 
 
 @dataclass(frozen=True)
-class RaceRoute(Route):
+class GatesRoute(Route):
     """The track to race on."""
 
     height: ClassVar = "track"
@@ -102,9 +103,37 @@ class RaceRoute(Route):
     whole: ClassVar = {"laps": 3}
 
     track: str = defaults.TRACK
-    """four_gates, s_shaped, circle_3d, j_shaped, or the path of a .toml file."""
+    """A shipped track (`e2efly list` has their names), or the path of a .toml file."""
     laps: int = number(1, high=LARGEST)
     """Number of laps to fly. 0: without end."""
+
+    def domain(self) -> Domain:
+        """The track."""
+        return track_domain(self._track())
+
+    def _track(self) -> RaceTrack:
+        track = load_track(self.track)
+        if self.laps > 1 and not track.closed:
+            raise ValueError(f"goal.laps is {self.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
+        return track
+
+    def _placed(self, goal: Racing, memory: Any, track: RaceTrack) -> Course:
+        start, heading = track.start.astype(np.float32).astype(np.float64), float(track.start_yaw)
+        return Course(goal, memory, start, heading=heading, points=track.corners, clearance=0.0)
+
+
+@dataclass(frozen=True)
+class RaceRoute(GatesRoute):
+    """The track to race on, as fast as the vehicle can."""
+
+    speed: float | None = number(None, above=0, high=SPEED)
+    """Commanded speed, m/s. If it is given, the zoo's race_speed flies in place of race, which flies as fast as it
+    can."""
+
+    @property
+    def instead(self) -> str | None:
+        """The policy that obeys a commanded speed."""
+        return None if self.speed is None else "race_speed"
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the track, from its start and with its heading."""
@@ -121,20 +150,10 @@ class RaceRoute(Route):
             AnyRaceGoal(self._options(), shape), AnyRaceMemory(Tracks.of(track), np.zeros(1, int)), track
         )
 
-    def domain(self) -> Domain:
-        """The track."""
-        return track_domain(self._track())
-
-    def _track(self) -> RaceTrack:
-        track = load_track(self.track)
-        if self.laps > 1 and not track.closed:
-            raise ValueError(f"goal.laps is {self.laps}; accepted: 0 or 1, as track {track.name!r} is not closed")
-        return track
-
     def _options(self) -> RaceConfig:
+        if self.speed is not None:
+            raise ValueError(
+                f"goal.speed is {self.speed:g}; accepted: None, as this policy flies as fast as it can; race_speed of "
+                "the zoo, and what `e2efly train race_speed` gives, obey a speed"
+            )
         return dataclasses.replace(RaceConfig(), laps=self.laps)
-
-    def _placed(self, goal: Racing, memory: Any, track: RaceTrack) -> Course:
-        lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
-        start = track.start.astype(np.float32).astype(np.float64)
-        return Course(goal, memory, start, heading=float(track.start_yaw), lowest=lowest, clearance=0.0)

@@ -27,7 +27,7 @@ from e2efly.config import (
     number,
     shape,
 )
-from e2efly.config.domain import Domain, Extent, extent, track_domain, union
+from e2efly.config.domain import Domain, displaced, extent, track_domain, union
 from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.config.run import CRL_RACING
 from e2efly.courses.tracks import load_track
@@ -112,29 +112,19 @@ class RaceClutterConfig(TaskConfig):
         return cls(laps=0, collisions_end=False)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """Each track, with one lap or the requested number of laps. Collisions end the episode."""
+        """Each track that is used, with one lap or the requested number of laps. Collisions end the episode."""
         judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)
         if len(self.track) == 1:
             return {self.name: judged}
-        return {Path(track).stem: dataclasses.replace(judged, only=float(i)) for i, track in enumerate(self.track)}
+        used = range(len(self.track)) if self.only < 0 else [int(self.only)]
+        return {Path(self.track[i]).stem: dataclasses.replace(judged, only=float(i)) for i in used}
 
     def domain(self) -> Domain:
         """The tracks with their displaced gates, the commanded speed, and up to so many obstacles."""
         names = self.track if self.only < 0 else (self.track[int(self.only)],)
         tracks = union(track_domain(load_track(name).enlarged(self.scale)) for name in names)
-        moved, turned = self.gate_position, self.gate_yaw
-        nearest = next(part.low for part in tracks if part.name == "gate_distance")
-        aside = math.asin(min(2 * math.sqrt(2) * moved / nearest, 1.0))  # by which the way to the next gate turns
-        more = {
-            "gate_altitude": moved, "gate_rise": 2 * moved, "gate_distance": 2 * math.sqrt(3) * moved,
-            "start_distance": math.sqrt(3) * moved, "gate_turn": 2 * turned, "gate_bearing": turned + aside,
-        }  # fmt: skip
         return (
-            *(
-                Extent(part.name, part.unit, round(part.low - wider, 6), round(part.high + wider, 6))
-                for part in tracks
-                for wider in (more.get(part.name, 0.0),)
-            ),
+            *displaced(tracks, self.gate_position, self.gate_yaw),
             extent("speed", "m/s", self.speed),
             extent("obstacles", "1", (0.0, self.clutter.obstacles)),
             extent("obstacle_size", "m", self.clutter.size),

@@ -18,19 +18,10 @@ from e2efly.courses.gates import Tracks
 from e2efly.courses.tracks import load_track, track_text
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
-from e2efly.tasks.race import any_goal
-from e2efly.tasks.race.any_goal import Ahead
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import distance, offsets
-
-
-@dataclass(frozen=True)
-class ClutterMemory(any_goal.AnyRaceMemory):
-    """The track of each vehicle, the number of gates that it has passed, and its commanded speed."""
-
-    speed: Array
-    """(n,) commanded speed, m/s."""
 
 
 @dataclass(frozen=True)
@@ -44,23 +35,23 @@ class RaceClutterGoal(Goal):
     """Number of collision checks per control step."""
 
     @classmethod
-    def state(cls, memory: Any) -> ClutterMemory:
+    def state(cls, memory: Any) -> AnyRaceMemory:
         """The state without what only cameras see."""
-        return ClutterMemory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(ClutterMemory)})
+        return AnyRaceMemory(**{part.name: getattr(memory, part.name) for part in dataclasses.fields(AnyRaceMemory)})
 
-    def goal(self, memory: ClutterMemory, time: Array) -> Array:
+    def goal(self, memory: AnyRaceMemory, time: Array) -> Array:
         """The next gate's centre."""
         return Ahead.of(memory).centre[:, 0]
 
-    def target_offsets(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
+    def target_offsets(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The centres of the next two gates minus position."""
         return offsets(Ahead.of(memory).centre[:, :2], body)
 
-    def flat_axes(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
+    def flat_axes(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The directions of flight through the next two gates."""
         return Ahead.of(memory).axis[:, :2].reshape(body.position.shape[0], 6)
 
-    def desired_speed(self, memory: ClutterMemory, time: Array, body: Any) -> Array:
+    def desired_speed(self, memory: AnyRaceMemory, time: Array, body: Any) -> Array:
         """The commanded speed."""
         return memory.speed[:, None]
 
@@ -102,7 +93,7 @@ class RaceClutterGoal(Goal):
         """The number of gates passed and the time of the last one, as text."""
         return f"{len(arrivals)} gates in {arrivals[-1]:.2f} s" if arrivals else "no gate"
 
-    def failure(self, memory: ClutterMemory, outcome: Outcome) -> str:
+    def failure(self, memory: AnyRaceMemory, outcome: Outcome) -> str:
         """The gate that was missed, if this is the reason."""
         where = f"gate {int(memory.index[0]) + 1} of lap {int(memory.passed[0] // memory.tracks.count[0]) + 1}"
         return f"{where} missed" if outcome.signals["missed"][0] else f"{super().failure(memory, outcome)}, {where}"
@@ -127,7 +118,7 @@ class RaceClutterRoute(Route):
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "RaceClutterRoute":
         """The route with the gates that were drawn, written to a file, and with the speed that was drawn."""
-        memory: ClutterMemory = course.memory
+        memory: AnyRaceMemory = course.memory
         file.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(file, track_text(memory.tracks.track(0)).encode())
         return cls(track=str(file), scale=1.0, laps=int(course.goal.config.laps), speed=float(memory.speed[0]))
@@ -140,9 +131,8 @@ class RaceClutterRoute(Route):
         """The course along the track, from its start and with its heading."""
         config = dataclasses.replace(RaceClutterConfig(), laps=self.laps)
         track = load_track(self.track).enlarged(self.scale)
-        memory = ClutterMemory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
-        lowest = float((track.position[:, 2] - track.opening[:, 1] / 2).min())
+        memory = AnyRaceMemory(Tracks.of(track), np.zeros(1, int), np.array([self.speed]))
         return Course(
             RaceClutterGoal(config, shape, control_period, 1), memory,
-            np.asarray(track.start, np.float64), heading=float(track.start_yaw), lowest=lowest, clearance=0.0,
+            np.asarray(track.start, np.float64), heading=float(track.start_yaw), points=track.corners, clearance=0.0,
         )  # fmt: skip

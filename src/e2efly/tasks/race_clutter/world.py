@@ -3,15 +3,12 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.courses.gates import Tracks
-from e2efly.courses.tracks import load_track
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
@@ -19,25 +16,24 @@ from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.generate import clutter
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
-from e2efly.tasks.race.any_goal import Ahead
+from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory, towards
+from e2efly.tasks.race.any_world import between, displaced, several
 from e2efly.tasks.race_clutter import RaceClutterConfig
-from e2efly.tasks.race_clutter.goal import ClutterMemory, RaceClutterGoal
+from e2efly.tasks.race_clutter.goal import RaceClutterGoal
 from e2efly.tasks.task import at_rest, into_ball, struck, uniform
 
 APPROACH = 0.7
 """Distance of two points in front of and behind each gate that obstacles also keep clear of, m."""
 PASSING = 1.5
 """Distance from a gate's plane within which a vehicle should be in line with its opening, m."""
-BEHIND = 0.3
-"""Distance behind a gate of the point to which the wanted velocity is directed, m."""
 LOOKING = 5.0
 """Distance ahead along the way at which a vehicle should look, m."""
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class ClutterWorld(ClutterMemory):
-    """The world of each vehicle, and the number of gates that it has passed."""
+@dataclass(frozen=True, kw_only=True)
+class ClutterWorld(AnyRaceMemory):
+    """The world of each vehicle, the number of gates that it has passed, and its commanded speed."""
 
     obstacles: dict[str, Solids]
 
@@ -56,33 +52,25 @@ class RaceClutter(RaceClutterGoal):
 
     @classmethod
     def of(cls, config: RaceClutterConfig, shape: Shape, control_period: float, checks: int = 1) -> "RaceClutter":
-        """Load the track.
+        """Load the tracks.
 
         Raises:
-            ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, for a
-                name given twice, and for a chosen track that is not among them.
+            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
+                is not among them.
         """
-        if isinstance(config.track, str) or not config.track:
-            raise ValueError(f"task.track is {config.track!r}; accepted: a tuple of one or more tracks")
-        names = [Path(track).stem for track in config.track]
-        if len(set(names)) < len(names):
-            raise ValueError(
-                f"task.track is {config.track}; accepted: tracks of different names, which tell the criteria"
-            )
-        if config.only not in range(-1, len(names)):
-            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {len(names) - 1}")
-        tracks = [load_track(name).enlarged(config.scale) for name in config.track]
-        room = max(len(track.yaw) for track in tracks)
-        given = jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
+        given = several(config.track, config.scale)
+        count = len(config.track)
+        if config.only not in range(-1, count):
+            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {count - 1}")
         # the tracks are resolved here, so that they share a compiled program
-        numbers = dataclasses.replace(config, track=("",) * len(tracks))
+        numbers = dataclasses.replace(config, track=("",) * count)
         return RaceClutter(numbers, shape, control_period, checks, given)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, ClutterWorld]:
         """At rest in a ball around the start of a track. Every world is different."""
         gate_key, clutter_key, state_key = jax.random.split(key, 3)
         c, u = self.config, uniform(state_key, n, 4)
-        tracks = self._drawn(gate_key, n)
+        tracks = displaced(gate_key, n, self.given, c.gate_position, c.gate_yaw, c.only)
         g = tracks.gates
         state = at_rest(g.start + c.position * into_ball(u[:, :3]))
         zero = jnp.zeros(n)
@@ -95,39 +83,8 @@ class RaceClutter(RaceClutterGoal):
         largest = jnp.max(jnp.where(tracks.there[..., None], g.half, 0.0))
         path, legs = _path(tracks, state.position)
         obstacles = clutter(clutter_key, n, c.clutter, path, keep, largest, legs)
-        low, high = c.speed
-        speed = (low + high) / 2 + (high - low) / 2 * u[:, 3]
-        memory = ClutterWorld(tracks, jnp.zeros(n, jnp.int32), speed, obstacles)
+        memory = ClutterWorld(tracks, jnp.zeros(n, jnp.int32), between(c.speed, u[:, 3]), obstacles=obstacles)
         return dataclasses.replace(state, quaternion=quaternion), memory
-
-    def _drawn(self, key: PRNGKeyArray, n: int) -> Tracks:
-        """A track for each world, with every gate slightly displaced."""
-        c, given = self.config, self.given
-        track_key, gate_key = jax.random.split(key)
-        which = jax.random.randint(track_key, (n,), 0, len(c.track))
-        which = jnp.where(c.only < 0, which, jnp.asarray(c.only).astype(jnp.int32))
-        tracks = jax.tree.map(lambda x: jnp.asarray(x)[which], given)
-        g, count = tracks.gates, given.gates.count
-        u = uniform(gate_key, n, 4 * count).reshape(n, count, 4)
-        move, turn = c.gate_position * u[..., :3], c.gate_yaw * u[..., 3]
-        cos, sin = jnp.cos(turn), jnp.sin(turn)
-        moved = dataclasses.replace(
-            g,
-            position=g.position.at[:, :-1].add(move),
-            cos=g.cos * cos - g.sin * sin,
-            sin=g.sin * cos + g.cos * sin,
-        )
-        return dataclasses.replace(tracks, gates=moved)
-
-    def desired_velocity(self, memory: ClutterWorld, state: State) -> Float[Array, "n 3"]:
-        """Velocity at the commanded speed towards a point close behind the next gate.
-
-        In the middle of the gate it still points straight through.
-        """
-        ahead = Ahead.of(memory)
-        behind = ahead.centre[:, 0] + BEHIND * ahead.axis[:, 0]
-        away = behind - state.position
-        return memory.speed[:, None] * away / (jnp.linalg.norm(away, axis=-1, keepdims=True) + 1e-3)
 
     def scene(self, memory: ClutterWorld) -> Scene:
         """Gates and obstacles over level ground."""
@@ -164,7 +121,7 @@ class RaceClutter(RaceClutterGoal):
         moved, outcome = self.verdict(memory, before, after, time, hit)
         signals = {
             "desired_speed": memory.speed,
-            "desired_velocity": self.desired_velocity(memory, after),
+            "desired_velocity": towards(memory, after, memory.speed),
             "overhang": self.overhang(memory, after),
         }
         return moved, dataclasses.replace(outcome, signals=signals)

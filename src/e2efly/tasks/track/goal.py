@@ -121,16 +121,17 @@ class TrackRoute(Route):
 
     height: ClassVar = "reference"
     longest_s: ClassVar = 12.0
+    trained: ClassVar = {"centre": defaults.CENTRE}
 
     reference: str = "circle"
     """circle, lemniscate, or the path of a .csv file with columns t, x, y, z."""
-    centre: tuple[float, float, float] = place(defaults.CENTRE)
+    centre: tuple[float, float, float] = place((0.0, 0.0, defaults.FLOWN_HEIGHT))
     """Centre of the circle or lemniscate, m."""
-    radius: float = number(defaults.RADIUS, low=SMALLEST)
+    radius: float = number(defaults.FLOWN_RADIUS, low=SMALLEST)
     """Radius of the circle, or half the length of the lemniscate, m."""
-    circle_rate: float = number(defaults.CIRCLE_RATE, low=-BODY_RATE, high=BODY_RATE)
+    circle_rate: float = number(defaults.FLOWN_CIRCLE_RATE, low=-BODY_RATE, high=BODY_RATE)
     """Angular rate of the circle, rad/s. Negative: clockwise."""
-    lemniscate_speed: float = number(defaults.LEMNISCATE_SPEED, low=SMALLEST, high=SPEED)
+    lemniscate_speed: float = number(defaults.FLOWN_LEMNISCATE_SPEED, low=SMALLEST, high=SPEED)
     """Top speed of the lemniscate, m/s."""
     phase: float = place(0.0)
     """Phase at which the circle or lemniscate begins, rad."""
@@ -142,8 +143,9 @@ class TrackRoute(Route):
         spline = self._spline()
         start = np.array(spline.position(np.zeros((1, 1)))[0, 0], np.float64)
         memory = TrackMemory(spline, np.zeros(1), np.zeros(1))
-        lowest = float(spline.knots[0, :, 0, 2].min())
-        return Course(TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, lowest=lowest)
+        return Course(
+            TrackGoal(TrackConfig(), shape), memory, start, duration=spline.duration, points=spline.knots[0, :, 0]
+        )
 
     def domain(self) -> Domain:
         """Top speed and acceleration of the reference."""

@@ -1,0 +1,117 @@
+"""Racing at a commanded speed: each policy of the zoo on each track, at each speed.
+
+    python benchmarks/race_speed.py [--policies vis_r/race_speed ...] [--tracks room_4 ...] [--speeds 2 3 5 8 12]
+
+Percent of the starts whose race succeeds: two laps, one of an open track. The gates are where the track's file has
+them, the vehicle is that of its file (of *any quadrotor* a random one), in still air. Speeds are means along the way
+from the first gate on, of the races that succeed, and the highest of all. `to the wall` is the smallest distance of any
+race's path to the walls of the track's room, and `under the ceiling` that to its ceiling. Rows that are not measured
+anew stay.
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from common import arguments, table, with_earlier, write
+
+from e2efly.courses.defaults import ROOMS, TRACKS
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.policy.zoo import contents
+from e2efly.simulation.device import prepare
+from e2efly.validation.evaluation import SEED, Candidate, act_of, candidate
+
+BATCH = 500
+"""Starts that are flown at once."""
+LAPS = 2
+"""Laps of a closed track."""
+
+
+def on(env: Env, name: str, speed: float) -> Env:
+    """The environment of one track, its gates in their places, at one speed. It shares its program with all others."""
+    row, task = TRACKS.index(name), env.task
+    given = jax.tree.map(lambda x: x[row : row + 1], task.given)
+    laps = LAPS if given.closed.all() else 1
+    config = dataclasses.replace(
+        task.config, speed=(speed, speed), gate_position=0.0, gate_yaw=0.0, laps=laps, episode_s=60.0
+    )
+    return dataclasses.replace(env, task=dataclasses.replace(task, config=config, given=given))
+
+
+@jax.jit
+def begun(env: Env, key: Any) -> Any:
+    """Starts."""
+    return env.reset(key, BATCH)
+
+
+@jax.jit
+def stepped(env: Env, state: Any, action: Any) -> Any:
+    """A step: state, what the policy is shown, and what is recorded."""
+    reached, out = env.step(state, action, restart=False)
+    vehicle, memory = reached.vehicle, reached.memory
+    speed = jnp.linalg.norm(vehicle.velocity, axis=-1)
+    return reached, out.final_observation, (vehicle.position, speed, memory.passed, out.done, out.success)
+
+
+def flown(found: Candidate, env: Env, key: Any) -> tuple[np.ndarray, ...]:
+    """Position (t, n, 3), speed (t, n), gates passed, whether it is still racing, and the success (n,)."""
+    act = act_of(found.policy)
+    (state, observation), memory, rows = begun(env, key), act.begin(BATCH), []
+    over, success = np.zeros(BATCH, bool), np.zeros(BATCH, bool)
+    for _ in range(int(60.0 / float(env.control_period))):
+        action, memory = act.act(np.asarray(observation), (), memory)
+        state, observation, told = stepped(env, state, action)
+        position, speed, passed, done, succeeded = map(np.asarray, told)
+        rows.append((position, speed, passed, ~over))
+        success |= succeeded & ~over
+        over = over | done
+        if over.all():
+            break
+    return *(np.stack(x) for x in zip(*rows, strict=True)), success
+
+
+def measured(found: Candidate, env: Env, name: str, speed: float, starts: int) -> dict[str, Any]:
+    """The figures of one track at one speed."""
+    parts = [flown(found, on(env, name, speed), random_key(SEED, UNSEEN, i)) for i in range(-(-starts // BATCH))]
+    along, far, high, top, success = [], 0.0, 0.0, 0.0, []
+    for position, fast, passed, live, succeeded in parts:
+        way = live & (passed > 0)
+        along.append((fast * way).sum(0)[succeeded] / way.sum(0)[succeeded])
+        far = max(far, np.abs(position[live][:, :2]).max())
+        high, top = max(high, position[live][:, 2].max()), max(top, fast[live].max())
+        success.append(succeeded)
+    share, speeds = float(np.concatenate(success).mean()), np.concatenate(along)
+    row = {"track": name, "commanded, m/s": speed, "starts": BATCH * len(parts), "success, %": round(100 * share, 1)}
+    mean = round(float(speeds.mean()), 2) if len(speeds) else None
+    row |= {"mean speed, m/s": mean, "top speed, m/s": round(float(top), 1)}
+    side, ceiling = ROOMS.get(name, (np.nan, np.nan))
+    walls = {"to the wall, m": side / 2 - far, "under the ceiling, m": ceiling - high}
+    return row | {what: round(float(x), 2) if np.isfinite(x) else "-" for what, x in walls.items()}
+
+
+def main() -> None:
+    """Fly, print a table, write the figures."""
+    every = [f"{vehicle}/race_speed" for vehicle, tasks in contents().items() if "race_speed" in tasks]
+    options = arguments(
+        __doc__ or "", policies=every, tracks=[*ROOMS, "four_gates"], speeds=[2.0, 3.0, 5.0, 8.0, 12.0], starts=1000
+    )
+    prepare("cpu")
+    rows = []
+    for policy in options.policies:
+        found = candidate(policy, task={"track": TRACKS})
+        (suite,) = found.task.criteria().values()
+        env = found.environment(suite)
+        for name in options.tracks:
+            for speed in options.speeds:
+                rows.append({"policy": policy, **measured(found, env, name, speed, options.starts)})
+                print(rows[-1], flush=True)
+    keys = "policy", "track", "commanded, m/s"
+    whole = sorted(with_earlier("race_speed", options.json, "table", keys, rows), key=lambda row: row["policy"])
+    write("race_speed", options.json, {"table": whole})
+    print(table(whole))
+
+
+if __name__ == "__main__":
+    main()
