@@ -114,11 +114,11 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
 
 def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys: pytest.CaptureFixture) -> None:
     """Of the zoo's policies; and the speed is said. A speed outside of the training is refused by name."""
-    given = ["crazyflie/race", "--vehicle", "crazyflie", "--goal.track", "room_6", "--goal.speed"]
+    given = ["race", "--goal.track", "room_6", "--goal.speed"]
     plan = _prepared(parse([*given, "4"]), Console())
-    assert plan.policy == policy_file("crazyflie/race_speed")
+    assert plan.policy == policy_file("race_speed")
     said = " ".join(capsys.readouterr().out.split())
-    assert "crazyflie/race_speed flies in place of crazyflie/race" in said
+    assert "vis_r/race_speed flies in place of vis_r/race" in said
     assert "It is told to fly at 4 m/s (goal.speed)." in said
     with pytest.raises(ValueError, match="goal: speed is 20 m/s; trained for 2 to 12 m/s"):
         _prepared(parse([*given, "20"]), Console())

@@ -10,7 +10,6 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.courses.gates import STRAIGHT_ON, Tracks
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.policy.observation import Field
-from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.verdicts import distance, offsets
 
@@ -29,7 +28,7 @@ class AnyRaceMemory:
     tracks: Tracks
     passed: Array
     """(n,) gates passed."""
-    speed: Array | float = math.inf
+    speed: Any = math.inf
     """(n,) commanded speed, m/s. Infinite: as fast as it can."""
 
     @property
@@ -81,7 +80,7 @@ def towards(memory: AnyRaceMemory, body: Any, speed: Array) -> Array:
 class AnyRaceGoal(Racing):
     """Fly through gates in order, on a separate track for each vehicle."""
 
-    config: RaceConfig
+    config: Any
     shape: Shape
 
     def place(self, memory: AnyRaceMemory) -> tuple[int, int]:

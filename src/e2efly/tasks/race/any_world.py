@@ -22,7 +22,7 @@ from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.scene import Scene
-from e2efly.tasks.race import ANY, RaceConfig
+from e2efly.tasks.race import ANY
 from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
@@ -42,7 +42,7 @@ class AnyRace(AnyRaceGoal):
     """The track of every episode (n = 1). None: each episode has another track."""
 
     @classmethod
-    def of(cls, config: RaceConfig, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "AnyRace":
+    def of(cls, config: Any, shape: Shape, control_period: float = 0.0, checks: int = 1) -> "AnyRace":
         """Load the track, if one is named.
 
         Raises:

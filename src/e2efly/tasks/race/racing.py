@@ -5,14 +5,14 @@ from typing import Any
 from e2efly.control.vectors import Array
 from e2efly.courses.gates import Gates
 from e2efly.policy.goal import Goal, Outcome, Shape
-from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.verdicts import distance, touches_ground
 
 
 class Racing(Goal):
     """Fly through gates in order."""
 
-    config: RaceConfig
+    config: Any
+    """The options of the task, `laps` and `fence` among them."""
     shape: Shape
 
     def place(self, memory: Any) -> tuple[int, int]:

@@ -22,9 +22,6 @@ from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
 from e2efly.tasks.registry import register
 
-WEIGHTS = {"vel": 1.0, "progway": 2.5, "fitlog": 20.0, "anglev_sq": 0.001, "act2_sq": 0.01}
-SETTINGS = {"learning_rate": 5e-3, "learning_rate_end": 2e-4, "gradient_decay": 0.6, "average": 0.99}
-
 
 @register("race_speed")
 @dataclass(frozen=True)
@@ -78,9 +75,11 @@ class RaceSpeedConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """Rewards for progress along the way, up to the commanded speed."""
-        settings: AlgorithmConfig = BPTTConfig(**SETTINGS)
-        weights, steps = WEIGHTS, 5_000_000
+        """Rewards for the commanded velocity, for progress along the way, and for the middle of the gates."""
+        settings: AlgorithmConfig = BPTTConfig(
+            learning_rate=5e-3, learning_rate_end=2e-4, gradient_decay=0.6, average=0.99
+        )
+        weights = {"vel": 1.0, "progway": 2.5, "fitlog": 20.0, "anglev_sq": 0.001, "act2_sq": 0.01}
         if algo == "ppo":
             settings = PPOConfig(gamma=0.97, learning_rate=5e-3, learning_rate_end=5e-4)
             weights = {
@@ -88,6 +87,6 @@ class RaceSpeedConfig(TaskConfig):
                 "crash": 1.0,
             }  # fmt: skip
         return TrainConfig(
-            cls.training(), settings, RewardConfig(dict(weights), {"fitlog_margin": 0.12}),
-            network=NetworkConfig((96, 96)), steps=steps, chunk=100,
+            cls.training(), settings, RewardConfig(weights, {"fitlog_margin": 0.12}),
+            network=NetworkConfig((96, 96)), steps=5_000_000, chunk=100,
         )  # fmt: skip
