@@ -13,7 +13,7 @@ from claims.running import HELD
 
 THEIRS, AUTHORS, OURS = "the paper's rewards", "its authors' rewards", "our rewards"
 """Whose rewards. The claims are about the first two."""
-PRESETS = {THEIRS: "paper", AUTHORS: "authors", OURS: "nominal"}
+PRESETS = {OURS: "nominal", THEIRS: "paper", AUTHORS: "authors"}
 MILLIONS = {
     "bptt": {"hover": 10, "land": 10, "track": 20, "race": 20},
     "ppo": {"hover": 10, "land": 20, "track": 20, "race": 20},
