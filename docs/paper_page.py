@@ -12,7 +12,7 @@ from typing import Any
 
 from e2efly import tasks
 from e2efly.commands.terminal import markdown
-from e2efly.config import Given
+from e2efly.config import Sourced
 from e2efly.runs.paper import AUTHORS, SILENT
 
 DOCS = Path(__file__).parent
@@ -118,7 +118,7 @@ def page() -> str:
 def numbers() -> list[dict[str, str]]:
     """Every number of the presets `paper` and `authors` that is not in the paper, with its source."""
 
-    def rows(task: str, preset: str, given: tuple[Given, ...]) -> list[dict[str, str]]:
+    def rows(task: str, preset: str, given: tuple[Sourced, ...]) -> list[dict[str, str]]:
         return [
             {"task": task, "preset": preset, "by": one.algo.upper() or "all", "number": f"`{one.field}`",
              "value": str(one.value) if len(str(one.value)) < LONGEST else "a whole part of the options",

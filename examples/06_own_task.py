@@ -48,7 +48,7 @@ class OrbitRoute(Route):
     def course(self, shape: Shape, control_period: float) -> Course:
         """The circle, endlessly."""
         orbit = Orbit(OrbitConfig(), shape, control_period)
-        return Course(orbit, np.zeros(1), start=np.array([1.0, 0.0, 3.0]), lowest=3.0)
+        return Course(orbit, np.zeros(1), start=np.array([1.0, 0.0, 3.0]), points=[(0.0, 0.0, 3.0)])
 
 
 @e2efly.register_task("orbit")

@@ -92,20 +92,20 @@ def test_a_vehicle_outside_of_every_range_is_trained_for_and_a_stopped_build_goe
     assert not out.exists()
     said = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["hover", "taken:", "any/hover"] in said
-    assert ["land_visual", "trained:", "preset", "robust,", "2.0", "M", "steps"] in said
+    assert ["race_clutter", "trained:", "preset", "robust,", "12.0", "M", "steps"] in said
     assert run(["build", str(parts), "--out", str(out), "--tasks", "hover"]) == 0
     assert (out / "hover" / "policy.onnx").read_bytes() == policy_file("any/hover").read_bytes()
-    asked = ["build", str(parts), "--out", str(out), "--tasks", "hover", "land_visual", "--train", "hover"]
+    asked = ["build", str(parts), "--out", str(out), "--tasks", "hover", "race_clutter", "--train", "hover"]
     assert run(asked) == 0
     file = str(out / "vehicle.toml")
     first = ["hover", "--preset", "identified", "--vehicle", file, "--out", str(out / "hover"), "--no-plots"]
-    second = ["land_visual", "--preset", "robust", "--vehicle", file, "--out", str(out / "land_visual"), "--no-plots"]
+    second = ["race_clutter", "--preset", "robust", "--vehicle", file, "--out", str(out / "race_clutter"), "--no-plots"]
     assert trained == [first, second]
     assert run(asked[:-2]) == 0  # without --train: what is trained already is kept
     assert len(trained) == 2
     (out / "hover" / "summary.json").write_text('{"finished": false}')
     (out / "hover" / "checkpoint.safetensors").write_bytes(b"")
-    (out / "land_visual" / "summary.json").unlink()  # stopped before its first checkpoint
+    (out / "race_clutter" / "summary.json").unlink()  # stopped before its first checkpoint
     assert run(asked) == 0
     assert trained[2:] == [["--resume", str(out / "hover"), "--no-plots"], [*second, "--overwrite"]]
 

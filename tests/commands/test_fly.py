@@ -114,7 +114,8 @@ def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: P
 
 def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys: pytest.CaptureFixture) -> None:
     """Of the zoo's policies; and the speed is said. A speed outside of the training is refused by name."""
-    given = ["race", "--goal.track", "room_6", "--goal.speed"]
+    wide = ["--flight.fence.low", "-6", "-6", "0.2", "--flight.fence.high", "9", "9", "4.5"]
+    given = ["race", "--goal.track", "room_6", *wide, "--goal.speed"]
     plan = _prepared(parse([*given, "4"]), Console())
     assert plan.policy == policy_file("race_speed")
     said = " ".join(capsys.readouterr().out.split())
@@ -122,7 +123,7 @@ def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys
     assert "It is told to fly at 4 m/s (goal.speed)." in said
     with pytest.raises(ValueError, match="goal: speed is 20 m/s; trained for 2 to 12 m/s"):
         _prepared(parse([*given, "20"]), Console())
-    alone = parse(["race_speed"])
+    alone = parse(["race_speed", *wide])
     assert _prepared(alone, Console()).policy == policy_file("race_speed")
     assert "It is told to fly at 3 m/s (goal.speed)." in " ".join(capsys.readouterr().out.split())
     copied = replace(parse(["race", "--goal.speed", "4"]), policy=policy_file("race_any"))

@@ -140,7 +140,7 @@ def test_a_mode_whose_commands_differ_from_vehicle_to_vehicle_is_refused() -> No
 
 
 def test_a_task_without_a_recipe_for_families_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["train", "land_visual", "--vehicle", "any"]) == 2
+    assert run(["train", "avoid", "--vehicle", "any"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "--vehicle is any, a family; accepted by preset 'robust' for hover by bptt" in said
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import Given, TrainConfig
+from e2efly.config import Sourced, TrainConfig
 from e2efly.config.changes import differing
 from e2efly.environment import Env
 from e2efly.policy.goal import Shape
@@ -43,7 +43,7 @@ def test_what_the_presets_differ_in_has_a_source(task: str, algo: str) -> None:
     before, after = values(ours), values(theirs)
     changed = {name for name in before | after if before.get(name) != after.get(name)}
     assert changed <= {one.field for one in given}
-    last: dict[str, Given] = {one.field: one for one in (*SILENT, *of.silent, *given) if one.algo in ("", algo)}
+    last: dict[str, Sourced] = {one.field: one for one in (*SILENT, *of.silent, *given) if one.algo in ("", algo)}
     for name, one in last.items():
         assert len(one.source) > 10
         assert after.get(name, "0.0") == json.dumps(json.loads(json.dumps(one.value, default=dataclasses.asdict)),

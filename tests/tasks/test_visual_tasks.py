@@ -160,7 +160,7 @@ def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
         seen = []
         for task, tracks in ((alone, own), (among, wide)):
             tracks = jax.tree.map(jnp.asarray, tracks)
-            memory = ClutterWorld(tracks, jnp.array([passed]), jnp.array([6.0]), {})
+            memory = ClutterWorld(tracks, jnp.array([passed]), speed=jnp.array([6.0]), obstacles={})
             seen.append(np.asarray(task.observe(memory, jnp.zeros(1), place)))
             assert np.asarray(task.scene(memory).solids["gate"].active).sum() == count
         np.testing.assert_array_equal(*seen)

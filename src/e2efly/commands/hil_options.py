@@ -53,7 +53,7 @@ class Hil:
     points: Path | None = None
     """A CSV file that replaces both: one row room_x,room_y,room_z,x,y,z for each point measured in the room, m."""
     fence_low: tuple[float, float, float] | None = None
-    """Smallest x, y, z of the fence in the room, m; the same as --flight.fence.low of `e2efly fly`. A course that the
+    """Smallest x, y, z of the fence in the room, m. The same as --flight.fence.low of `e2efly fly`. A course that the
     fence does not hold is refused."""
     fence_high: tuple[float, float, float] | None = None
     """Largest x, y, z of the fence, m."""

@@ -26,11 +26,11 @@ from e2efly.config.env import (
 from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.random_worlds import CLUTTER, ClutterConfig, ForestConfig
 from e2efly.config.run import (
-    Given,
     NetworkConfig,
     Paper,
     RewardConfig,
     Robust,
+    Sourced,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -50,7 +50,6 @@ __all__ = [
     "EnvConfig",
     "FOPPOConfig",
     "ForestConfig",
-    "Given",
     "ImageNoiseConfig",
     "ImuConfig",
     "NetworkConfig",
@@ -60,6 +59,7 @@ __all__ = [
     "RewardConfig",
     "Robust",
     "SHACConfig",
+    "Sourced",
     "StageConfig",
     "TaskConfig",
     "TrainConfig",

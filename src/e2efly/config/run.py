@@ -67,7 +67,7 @@ OURS = "ours: the paper names the term, but no weight"
 
 
 @dataclass(frozen=True)
-class Given:
+class Sourced:
     """A value of a preset that is not in the paper, and where it is from."""
 
     field: str
@@ -88,9 +88,9 @@ class Paper:
     """Weights of the reward (from the paper's tables)."""
     millions: tuple[int, int]
     """Environment steps for PPO and for BPTT, in millions (from the paper)."""
-    silent: tuple[Given, ...] = ()
+    silent: tuple[Sourced, ...] = ()
     """Values that a training needs and the paper does not give."""
-    authors: tuple[Given, ...] = ()
+    authors: tuple[Sourced, ...] = ()
     """Values of its authors' public code, which the preset `authors` has in addition."""
 
 

@@ -113,7 +113,8 @@ class Goal:
     @property
     def shown(self) -> tuple[Observed, ...]:
         """The task's own observation fields that its options show."""
-        return tuple(row for row in self.observation if self.config.shows(row[0].name))
+        shows = getattr(self.config, "shows", None)
+        return tuple(row for row in self.observation if shows is None or shows(row[0].name))
 
     @property
     def fields(self) -> tuple[Field, ...]:

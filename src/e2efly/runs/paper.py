@@ -1,6 +1,6 @@
 """The presets `paper` and `authors`: a task as the paper trains it, and as its authors' public code does.
 
-What the paper gives are the weights, steps and sizes of its tables. What it does not give is a `Given`, with its
+What the paper gives are the weights, steps and sizes of its tables. What it does not give is a `Sourced`, with its
 source. Imports no JAX.
 """
 
@@ -12,9 +12,9 @@ from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
     EnvConfig,
-    Given,
     PPOConfig,
     RewardConfig,
+    Sourced,
     TaskConfig,
     TrainConfig,
 )
@@ -22,24 +22,24 @@ from e2efly.config.run import CRL_RACING, VISFLY
 from e2efly.tasks import TASKS
 
 SILENT = (
-    Given("algo.decay", "linear", f"{VISFLY}: utils/algorithms/lr_scheduler.py"),
-    Given("algo.epochs", 10, "default of Stable-Baselines3, on which VisFly's PPO is built", "ppo"),
-    Given("algo.log_std", -1.0, "ours: theirs, 0, is for body rates of 1 to 3 rad/s; VIS-R's go to 10", "ppo"),
-    Given("env.past_actions", 0, "the paper's observations have 13, 16, 17 and 40 numbers: none for past actions"),
+    Sourced("algo.decay", "linear", f"{VISFLY}: utils/algorithms/lr_scheduler.py"),
+    Sourced("algo.epochs", 10, "default of Stable-Baselines3, on which VisFly's PPO is built", "ppo"),
+    Sourced("algo.log_std", -1.0, "ours: theirs, 0, is for body rates of 1 to 3 rad/s; VIS-R's go to 10", "ppo"),
+    Sourced("env.past_actions", 0, "the paper's observations have 13, 16, 17 and 40 numbers: none for past actions"),
 )
 """Values of every task that the paper does not give."""
 AUTHORS = (
-    Given("env.control_rate", 1 / 0.03, f"{VISFLY}: envs/base/dynamics.py, ctrl_dt 0.03 s"),
-    Given("env.action_latency", (0.06, 0.06), f"{VISFLY}: envs/base/dynamics.py, comm_delay"),
-    Given(
+    Sourced("env.control_rate", 1 / 0.03, f"{VISFLY}: envs/base/dynamics.py, ctrl_dt 0.03 s"),
+    Sourced("env.action_latency", (0.06, 0.06), f"{VISFLY}: envs/base/dynamics.py, comm_delay"),
+    Sourced(
         "env.command_range", ((0.0, -2.0, -2.0, -2.0), (29.43, 2.0, 2.0, 2.0)),
         f"{VISFLY}: configs/drone/drone_state.json, max_rate 2.0 rad/s and max_acc 3 g",
     ),
-    Given("task.episode_s", 7.68, f"{VISFLY}: max_episode_steps 256 of 0.03 s"),
-    Given("algo.learning_rate", 1e-3, f"{CRL_RACING}: examples/ete_racing_sim/run.py", "ppo"),
-    Given("algo.learning_rate_end", 1e-4, f"{CRL_RACING}: examples/ete_racing_sim/run.py, lr_schedule", "ppo"),
-    Given("algo.epochs", 5, f"{VISFLY}: exps/examples/alg_cfgs/landing/PPO.yaml", "ppo"),
-    Given("algo.log_std", 0.0, "default of Stable-Baselines3, on which VisFly's PPO is built", "ppo"),
+    Sourced("task.episode_s", 7.68, f"{VISFLY}: max_episode_steps 256 of 0.03 s"),
+    Sourced("algo.learning_rate", 1e-3, f"{CRL_RACING}: examples/ete_racing_sim/run.py", "ppo"),
+    Sourced("algo.learning_rate_end", 1e-4, f"{CRL_RACING}: examples/ete_racing_sim/run.py, lr_schedule", "ppo"),
+    Sourced("algo.epochs", 5, f"{VISFLY}: exps/examples/alg_cfgs/landing/PPO.yaml", "ppo"),
+    Sourced("algo.log_std", 0.0, "default of Stable-Baselines3, on which VisFly's PPO is built", "ppo"),
 )  # fmt: skip
 """Values of every task in the authors' public code."""
 
@@ -91,7 +91,7 @@ def _tables(task: type[TaskConfig], algo: str) -> TrainConfig:
     )  # fmt: skip
 
 
-def _with(config: TrainConfig, given: tuple[Given, ...]) -> TrainConfig:
+def _with(config: TrainConfig, given: tuple[Sourced, ...]) -> TrainConfig:
     """A configuration with those of the values that are for its algorithm."""
     for one in given:
         if one.algo in ("", config.algo.name):

@@ -34,6 +34,10 @@ MOST = 0.7
 WRONG = 10
 """After this many images in a row that contradict the ground, the camera is mounted differently, upside down for
 example."""
+MOUNTED = 0.06
+"""How far a camera may be off its mount, rad: as far as in the training of the preset `robust`."""
+STANDING = 0.2
+"""Height of a camera over the ground below which the vehicle may stand on something, m."""
 LEVEL, TURNING = 0.35, 1.0
 """The largest tilt, rad, and body rate, rad/s, at which a pose still tells where the ground is in a slightly older
 image."""
@@ -145,7 +149,9 @@ def _shows(camera: Image, image: np.ndarray) -> bool:
 
 
 def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float) -> bool | None:
-    """Whether the lowest row of a depth image is farther away than the ground there. None: the image cannot tell."""
+    """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is tilted up by
+    `MOUNTED` more than it should be. None: the image cannot tell.
+    """
     turning = float(np.linalg.norm(odometry.body_rate)) > TURNING
     if camera.sees != "depth" or camera.projection != "pinhole" or turning or tilt_of(odometry.quaternion) > LEVEL:
         return None
@@ -157,7 +163,9 @@ def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: f
     rays = Quat.of(odometry.quaternion).rotate(Vec3(ones * (cos + low * sin), left, ones * (low * cos - sin)))
     place = Quat.of(odometry.quaternion).rotate(Vec3(*camera.position_m))
     height = float(odometry.position[2]) + float(place.z) - ground
-    depth = height / np.maximum(-np.asarray(rays.z), 1e-6)
+    if height < STANDING:
+        return None
+    depth = height / np.maximum(-np.asarray(rays.z) - MOUNTED, 1e-6)
     told = (depth > camera.reach_m[0]) & (depth * BEYOND + BEYOND_M < camera.reach_m[1]) & (image[-1] > 0)
     if told.mean() < MOST:
         return None

@@ -10,12 +10,12 @@ from e2efly.config import (
     BPTTConfig,
     EnvConfig,
     ForestConfig,
-    Given,
     NetworkConfig,
     Paper,
     PPOConfig,
     RewardConfig,
     Robust,
+    Sourced,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -47,11 +47,11 @@ class AvoidConfig(TaskConfig):
         weights={"prog1": 0.9, "ori1": 0.04, "v3": 0.002, "anglev": 0.002, "avoid2": 0.01},
         millions=(100, 50),
         silent=(
-            Given("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
-            Given("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
-            Given("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
+            Sourced("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
+            Sourced("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
+            Sourced("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
         ),
-        authors=(Given("task.episode_s", 20.0, "ours: the whole forest must fit into an episode"),),
+        authors=(Sourced("task.episode_s", 20.0, "ours: the whole forest must fit into an episode"),),
     )
 
     episode_s: float = 20.0

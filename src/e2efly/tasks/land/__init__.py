@@ -8,11 +8,11 @@ import numpy as np
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
-    Given,
     Paper,
     PPOConfig,
     RewardConfig,
     Robust,
+    Sourced,
     TaskConfig,
     TrainConfig,
     number,
@@ -32,19 +32,19 @@ PPO_WEIGHTS = {
 
 
 PAPER_SILENT = (
-    Given("reward.weights.act3", 1.0, OURS, "ppo"),
-    Given("reward.weights.goal", 20.0, f"{VISFLY}: envs/LandingEnv.py, r_s", "ppo"),
-    Given("reward.weights.crash", 0.1, f"{VISFLY}: envs/LandingEnv.py, r_l", "ppo"),
+    Sourced("reward.weights.act3", 1.0, OURS, "ppo"),
+    Sourced("reward.weights.goal", 20.0, f"{VISFLY}: envs/LandingEnv.py, r_s", "ppo"),
+    Sourced("reward.weights.crash", 0.1, f"{VISFLY}: envs/LandingEnv.py, r_l", "ppo"),
 )
 """Values of both landings that the paper does not give."""
 PAPER_AUTHORS = (
-    Given("task.must_touch", False, f"{VISFLY}: envs/LandingEnv.py, get_success"),
-    Given("task.radius", 0.3, f"{VISFLY}: envs/LandingEnv.py, landing_half; theirs is a square"),
-    Given("task.height_error", 0.2, f"{VISFLY}: envs/LandingEnv.py, get_success"),
-    Given("task.speed", 0.3, f"{VISFLY}: envs/LandingEnv.py, get_success"),
-    Given("task.tilt", 3.14, f"{VISFLY}: envs/LandingEnv.py, get_success asks for no attitude"),
-    Given("task.velocity", 0.0, f"{VISFLY}: envs/LandingEnv.py, starts at rest"),
-    Given("task.episode_s", 3.84, f"{VISFLY}: envs/LandingEnv.py, max_episode_steps 128 of 0.03 s"),
+    Sourced("task.must_touch", False, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Sourced("task.radius", 0.3, f"{VISFLY}: envs/LandingEnv.py, landing_half; theirs is a square"),
+    Sourced("task.height_error", 0.2, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Sourced("task.speed", 0.3, f"{VISFLY}: envs/LandingEnv.py, get_success"),
+    Sourced("task.tilt", 3.14, f"{VISFLY}: envs/LandingEnv.py, get_success asks for no attitude"),
+    Sourced("task.velocity", 0.0, f"{VISFLY}: envs/LandingEnv.py, starts at rest"),
+    Sourced("task.episode_s", 3.84, f"{VISFLY}: envs/LandingEnv.py, max_episode_steps 128 of 0.03 s"),
 )
 """Values of both landings in the authors' public code."""
 
@@ -78,8 +78,8 @@ class LandConfig(TaskConfig):
         silent=PAPER_SILENT,
         authors=(
             *PAPER_AUTHORS,
-            Given("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
-            Given("task.sideways", 1.0, f"{VISFLY}: envs/LandingEnv.py, half of the starts"),
+            Sourced("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
+            Sourced("task.sideways", 1.0, f"{VISFLY}: envs/LandingEnv.py, half of the starts"),
         ),
     )
 

@@ -10,12 +10,12 @@ from e2efly.config import (
     BPTTConfig,
     CameraConfig,
     EnvConfig,
-    Given,
     NetworkConfig,
     Paper,
     PPOConfig,
     RewardConfig,
     Robust,
+    Sourced,
     TaskConfig,
     TrainConfig,
     number,
@@ -48,11 +48,11 @@ class LandVisualConfig(TaskConfig):
         millions=(100, 1),
         silent=(
             *PAPER_SILENT,
-            Given("task.shows_position", True, "the paper's table; its text says that no target is observed"),
+            Sourced("task.shows_position", True, "the paper's table; its text says that no target is observed"),
         ),
         authors=(
             *PAPER_AUTHORS,
-            Given("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
+            Sourced("task.height", (1.5, 3.5), f"{VISFLY}: envs/LandingEnv.py, starts 2.5 m over the ground, +-1 m"),
         ),
     )
 

@@ -10,12 +10,12 @@ import numpy as np
 from e2efly.config import (
     AlgorithmConfig,
     BPTTConfig,
-    Given,
     NetworkConfig,
     Paper,
     PPOConfig,
     RewardConfig,
     Robust,
+    Sourced,
     TaskConfig,
     TrainConfig,
     number,
@@ -75,16 +75,16 @@ class RaceConfig(TaskConfig):
         weights={"prog1": 0.9, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         millions=(100, 50),
         silent=(
-            Given("reward.weights.act3", 1.0, OURS, "ppo"),
-            Given("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
-            Given("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
+            Sourced("reward.weights.act3", 1.0, OURS, "ppo"),
+            Sourced("reward.weights.goal", 5.0, "the paper's weight in clutter", "ppo"),
+            Sourced("reward.weights.crash", 4.0, "the paper's weight in clutter", "ppo"),
         ),
         authors=(
-            Given("reward.weights.alive", 0.1, f"{VISFLY}: envs/RacingEnv.py, base_r"),
-            Given("reward.weights.goal", 20.0, f"{VISFLY}: envs/RacingEnv.py, success_r", "ppo"),
-            Given("reward.weights.crash", 0.0, f"{VISFLY}: envs/RacingEnv.py has no such term", "ppo"),
-            Given("task.position", 0.2, f"{VISFLY}: envs/RacingEnv.py, half of the starts"),
-            Given("task.episode_s", 12.0, "ours: a whole lap must fit into an episode"),
+            Sourced("reward.weights.alive", 0.1, f"{VISFLY}: envs/RacingEnv.py, base_r"),
+            Sourced("reward.weights.goal", 20.0, f"{VISFLY}: envs/RacingEnv.py, success_r", "ppo"),
+            Sourced("reward.weights.crash", 0.0, f"{VISFLY}: envs/RacingEnv.py has no such term", "ppo"),
+            Sourced("task.position", 0.2, f"{VISFLY}: envs/RacingEnv.py, half of the starts"),
+            Sourced("task.episode_s", 12.0, "ours: a whole lap must fit into an episode"),
         ),
     )
 

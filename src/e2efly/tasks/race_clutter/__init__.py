@@ -14,13 +14,13 @@ from e2efly.config import (
     CameraConfig,
     ClutterConfig,
     EnvConfig,
-    Given,
     ImageNoiseConfig,
     NetworkConfig,
     Paper,
     PPOConfig,
     RewardConfig,
     Robust,
+    Sourced,
     StageConfig,
     TaskConfig,
     TrainConfig,
@@ -60,20 +60,20 @@ class RaceClutterConfig(TaskConfig):
         weights={"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01, "goal": 5.0, "crash": 4.0},
         millions=(100, 50),
         silent=(
-            Given("task.shows_axes", False, "the paper's observation has 17 numbers"),
-            Given("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
+            Sourced("task.shows_axes", False, "the paper's observation has 17 numbers"),
+            Sourced("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
         ),
         authors=(
-            Given("task.scale", 1.0, f"{CRL_RACING}: envs/demo2_3Dcircle_onboard.py, a circle of 6x6 m"),
-            Given("task.speed", (2.0, 4.0), "ours: what tracks of this size allow; v_d of their code is 0.5 to 1 m/s"),
-            Given(
+            Sourced("task.scale", 1.0, f"{CRL_RACING}: envs/demo2_3Dcircle_onboard.py, a circle of 6x6 m"),
+            Sourced("task.speed", (2.0, 4.0), "ours: what such tracks allow; v_d of their code is 0.5 to 1 m/s"),
+            Sourced(
                 "task.clutter",
                 ClutterConfig(sideways=2.0, size=(0.15, 0.15)),
                 f"{CRL_RACING}: examples/ete_racing_sim/random_obstacle.py, 18 trees of 0.15 m",
             ),
-            Given("task.position", 0.3, f"{CRL_RACING}: envs/demo3_U.py, half of the starts"),
-            Given("task.episode_s", 20.0, "ours: a whole lap must fit into an episode"),
-            Given("env.cameras", (AUTHORS_CAMERA,), f"{CRL_RACING}: envs/demo3_U.py, sensor_kwargs and noisy_depth"),
+            Sourced("task.position", 0.3, f"{CRL_RACING}: envs/demo3_U.py, half of the starts"),
+            Sourced("task.episode_s", 20.0, "ours: a whole lap must fit into an episode"),
+            Sourced("env.cameras", (AUTHORS_CAMERA,), f"{CRL_RACING}: envs/demo3_U.py, sensor_kwargs and noisy_depth"),
         ),
     )
 
