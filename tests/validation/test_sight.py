@@ -102,7 +102,8 @@ def test_rows_of_cameras_change_what_the_plant_sees() -> None:
         assert (seen(row) != nominal).mean() > 0.1, row
     noisy = seen("noise of a D435i")
     assert (noisy != nominal).mean() > 0.1
-    assert np.median(np.abs(noisy - nominal)) < 0.2
+    near = (nominal < 5) & (noisy > 0)  # far things become holes
+    assert near.mean() > 0.05 and np.median(np.abs(noisy - nominal)[near]) < 0.2
     report = stress("avoid", "simulator", 1, rows=("images 40 ms older", "nominal"))
     assert set(report.flown) == {"images 40 ms older", "nominal"}
     assert ALL not in report.left_out
