@@ -12,8 +12,9 @@ from e2efly.commands.train import parse
 from e2efly.config import TrainConfig
 from e2efly.runs import presets
 from e2efly.runs.inputs import to_json
+from e2efly.runs.paper import NAMES
 from e2efly.runs.rundir import RunDirectory
-from e2efly.runs.sizes import STATED, environments, for_device
+from e2efly.runs.sizes import environments, for_device
 from e2efly.simulation import device
 from e2efly.simulation.device import FAST_COMPILE, device_kind
 from e2efly.tasks import TASKS
@@ -50,7 +51,7 @@ def test_a_preset_on_a_gpu_has_more_environments_and_as_many_gradient_steps(task
     assert same == (gpu.task, gpu.reward, gpu.env, gpu.network, gpu.algo.learning_rate)
 
 
-@pytest.mark.parametrize("preset", [name for name in STATED if name in presets.names()])
+@pytest.mark.parametrize("preset", [name for name in NAMES if name in presets.names()])
 def test_the_conditions_of_a_result_are_the_same_on_every_device(preset: str) -> None:
     assert presets.starting("hover", "ppo", preset, device="gpu") == presets.preset("hover", "ppo", preset)
 

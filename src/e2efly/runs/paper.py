@@ -21,6 +21,8 @@ from e2efly.config import (
 from e2efly.config.run import CRL_RACING, VISFLY
 from e2efly.tasks import TASKS
 
+NAMES = ("paper", "authors")
+"""The names of the presets. Their sizes are conditions of somebody else's result: the same on every device."""
 SILENT = (
     Sourced("algo.decay", "linear", f"{VISFLY}: utils/algorithms/lr_scheduler.py"),
     Sourced("algo.epochs", 10, "default of Stable-Baselines3, on which VisFly's PPO is built", "ppo"),

@@ -23,14 +23,15 @@ from e2efly.config.tables import LARGEST
 from e2efly.policy import zoo
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
-from e2efly.runs.paper import authors, papers
+from e2efly.runs.paper import NAMES, authors, papers
 from e2efly.runs.sizes import for_device
 from e2efly.tasks import TASKS
 from e2efly.vehicles import posterior
 from e2efly.vehicles.family import load_family
 from e2efly.vehicles.loading import load_vehicle
 
-ROBUST, IDENTIFIED, NOMINAL, PAPER, AUTHORS = "robust", "identified", "nominal", "paper", "authors"
+ROBUST, IDENTIFIED, NOMINAL = "robust", "identified", "nominal"
+PAPER, AUTHORS = NAMES
 FAMILY = "any"
 """The family whose policies of the zoo are the starting points of the preset `identified`."""
 OTHERS = EnvConfig(

@@ -10,9 +10,8 @@ import math
 from typing import Any
 
 from e2efly.config import TrainConfig
+from e2efly.runs.paper import NAMES
 
-STATED = ("paper", "authors")
-"""Presets whose sizes are conditions of somebody else's result. They are the same on every device."""
 MEASURED = ("ppo", "bptt")
 """Algorithms whose rates on a GPU are measured. The others keep their sizes there."""
 PLAIN, MEMORY, SIGHT = 16_384, 4096, 2048
@@ -49,7 +48,7 @@ def for_device(config: TrainConfig, preset: str, device: str) -> TrainConfig:
     """
     algo: Any = config.algo
     factor = environments(config) // algo.envs
-    if device != "gpu" or preset in STATED or algo.name not in MEASURED or factor <= QUARTER:
+    if device != "gpu" or preset in NAMES or algo.name not in MEASURED or factor <= QUARTER:
         return config
     sizes = {name: factor * getattr(algo, name) for name in ("envs", "minibatch") if hasattr(algo, name)}
     before = math.ceil(config.steps / algo.steps)

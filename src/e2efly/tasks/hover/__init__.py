@@ -22,8 +22,9 @@ from e2efly.config import (
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import INK, Line, Mark, Thing, circle
 from e2efly.config.numbers import ANGLE, BODY_RATE, SPEED
-from e2efly.config.run import OURS, VISFLY, check_aloft, check_counted
+from e2efly.config.run import VISFLY, check_aloft, check_counted
 from e2efly.courses import defaults
+from e2efly.tasks import public_code
 from e2efly.tasks.registry import register
 
 
@@ -64,21 +65,11 @@ class HoverConfig(TaskConfig):
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
         millions=(50, 10),
-        silent=(
-            Sourced("reward.weights.alive", 0.1, f"{VISFLY}: envs/HoverEnv.py, base_r"),
-            Sourced("reward.weights.act3", 1.0, OURS, "ppo"),
-            Sourced("reward.weights.goal", 1.0, OURS, "ppo"),
-            Sourced("reward.weights.crash", 1.0, OURS, "ppo"),
-        ),
+        silent=public_code.silent("envs/HoverEnv.py"),
         authors=(
-            Sourced("reward.weights.prog2", 0.1 / 9, f"{VISFLY}: envs/HoverEnv.py, pos_factor"),
-            Sourced("reward.weights.ori2", 0.00001, f"{VISFLY}: envs/HoverEnv.py"),
-            Sourced("reward.weights.act3", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
-            Sourced("reward.weights.goal", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
-            Sourced("reward.weights.crash", 0.0, f"{VISFLY}: envs/HoverEnv.py has no such term", "ppo"),
+            *public_code.authors("envs/HoverEnv.py"),
             Sourced("task.target", (0.0, 0.0, 1.5), f"{VISFLY}: envs/HoverEnv.py, target"),
             Sourced("task.position", 1.0, f"{VISFLY}: envs/HoverEnv.py, half of the starts; theirs is 0.5 m in z"),
-            Sourced("task.velocity", 0.0, f"{VISFLY}: envs/HoverEnv.py, starts at rest"),
             Sourced("task.tilt", 0.0, f"{VISFLY}: envs/HoverEnv.py, level starts"),
             Sourced("task.body_rate", 0.0, f"{VISFLY}: envs/HoverEnv.py, starts at rest"),
         ),

@@ -20,9 +20,10 @@ from e2efly.config import (
 )
 from e2efly.config.domain import Domain
 from e2efly.config.numbers import BODY_RATE, SPEED
-from e2efly.config.run import OURS, VISFLY, check_aloft
+from e2efly.config.run import VISFLY, check_aloft
 from e2efly.courses import defaults
 from e2efly.courses.references import KNOT_PERIOD, Lissajous, motion_domain, read_csv, through_points
+from e2efly.tasks import public_code
 from e2efly.tasks.registry import register
 
 
@@ -58,22 +59,12 @@ class TrackConfig(TaskConfig):
     paper: ClassVar = Paper(
         weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},
         millions=(50, 20),
-        silent=(
-            Sourced("reward.weights.alive", 0.1, f"{VISFLY}: envs/TrackingEnv.py, base_r"),
-            Sourced("reward.weights.act3", 1.0, OURS, "ppo"),
-            Sourced("reward.weights.goal", 1.0, OURS, "ppo"),
-            Sourced("reward.weights.crash", 1.0, OURS, "ppo"),
-        ),
+        silent=public_code.silent("envs/TrackingEnv.py"),
         authors=(
-            Sourced("reward.weights.prog2", 0.1 / 9, f"{VISFLY}: envs/TrackingEnv.py, pos_factor"),
-            Sourced("reward.weights.ori2", 0.00001, f"{VISFLY}: envs/TrackingEnv.py"),
-            Sourced("reward.weights.act3", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
-            Sourced("reward.weights.goal", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
-            Sourced("reward.weights.crash", 0.0, f"{VISFLY}: envs/TrackingEnv.py has no such term", "ppo"),
+            *public_code.authors("envs/TrackingEnv.py"),
             Sourced("task.reference", "circle", f"{VISFLY}: envs/TrackingEnv.py, radius 2 m, 0.2 pi rad/s"),
             Sourced("task.centre", (0.0, 0.0, 1.0), f"{VISFLY}: envs/TrackingEnv.py, centre"),
             Sourced("task.position", 0.2, f"{VISFLY}: envs/TrackingEnv.py; theirs is around the circle's centre"),
-            Sourced("task.velocity", 0.0, f"{VISFLY}: envs/TrackingEnv.py, starts at rest"),
         ),
     )
 
