@@ -13,6 +13,7 @@ from typing import Any
 from e2efly import tasks
 from e2efly.commands.terminal import markdown
 from e2efly.config import Sourced
+from e2efly.config.registry import is_shipped
 from e2efly.runs.paper import AUTHORS, SILENT
 
 DOCS = Path(__file__).parent
@@ -127,7 +128,7 @@ def numbers() -> list[dict[str, str]]:
         ]  # fmt: skip
 
     found = rows("all", "paper, authors", SILENT) + rows("all", "authors", AUTHORS)
-    for name, task in tasks.TASKS.items():
+    for name, task in ((name, task) for name, task in tasks.TASKS.items() if is_shipped(task)):
         if task.paper is not None:
             found += rows(name, "paper, authors", task.paper.silent) + rows(name, "authors", task.paper.authors)
     return found
