@@ -30,3 +30,12 @@ def test_take_off_hover_policy_hover_land_by_switches_alone(policy_of: Callable[
     assert tuple(m["mode"] for m in read["mode"].values) == flight.modes[1:]
     begins, ends = (read["mode"].stamp[i] / 1e9 for i in (2, 3))
     assert len(read["policy"]) == pytest.approx((ends - begins) * policy.contract.control_rate_hz, abs=2)
+
+
+@pytest.mark.whole
+def test_the_guard_ends_no_race_that_flies_high_enough() -> None:
+    """Laps at full speed, on the track of a rehearsal without a route."""
+    flight = rehearse(firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3)
+    assert flight.complete, flight.reasons
+    assert flight.success
+    assert flight.top_speed > 9.0
