@@ -75,25 +75,26 @@ def test_without_the_transmitter_the_motors_stop_within_a_second(room: Rig) -> N
     room.held = False
 
 
+@pytest.mark.whole
 def test_the_first_flight_is_within_the_numbers_of_the_guide(room: Rig) -> None:
     session = Session(room, replace(SETTINGS, takeoff_height=0.6))
     rows = examine(session.info, VEHICLE, SETTINGS)
     assert [row for row in rows if not row.good] == []  # the lines leave nothing to correct
     room.set(override=True, throttle=0.0)
-    session.fly(3.0)
+    session.fly(1.0)
     assert session.bridge.flight.reasons == (Reason.NOT_ARMED,)
     room.set(armed=True)
-    session.fly(1.0)
+    session.fly(0.5)
     assert session.bridge.flight.reasons == (Reason.WAITING,)
     start = room.state.position + np.array([0, 0, 0.6])
     room.set(mission="hover")
     assert session.fly(3.0, session.in_mode(Mode.HOVER))
     session.fly(2.0)
-    assert _farthest(session, start, 2.0) < NEAR
+    assert _farthest(session, start, 1.0) < NEAR
     room.set(roll=1.0)  # reposition: a second of full stick
     session.fly(1.0)
     room.set(roll=0.0)
-    session.fly(2.0)
+    session.fly(1.5)
     assert room.state.position - start == pytest.approx((0, -0.8, 0), abs=0.2)
     room.set(override=False, throttle=0.2)  # takeover
     assert session.fly(SOON, session.in_mode(Mode.PILOT))
@@ -101,7 +102,7 @@ def test_the_first_flight_is_within_the_numbers_of_the_guide(room: Rig) -> None:
     left = np.array(room.state.position)
     room.set(override=True, throttle=0.0)
     assert session.fly(SOON, session.in_mode(Mode.HOVER))
-    assert _farthest(session, left, 2.0) < NEAR
+    assert _farthest(session, left, 1.0) < NEAR
     room.set(mission="land")
     assert session.fly(5.0, session.in_mode(Mode.DONE))
     assert np.linalg.norm(room.state.position[:2] - left[:2]) < NEAR
