@@ -54,7 +54,9 @@ def test_a_controller_that_no_bridge_has_fed_is_not_to_be_armed_with_override_hi
     room.sleep(SOON)
     assert not room.sitl.motors().any()  # the kill switch
     room.held = False
-    assert races == (room.sitl.firmware.release.override_timeout is None)
+    release = room.sitl.firmware.release
+    assert races or release is not firmware_program.PACKAGED
+    assert not races or release.override_timeout is None  # later firmware hands such an override back
 
 
 def test_without_the_transmitter_the_motors_stop_within_a_second(room: Rig) -> None:

@@ -78,6 +78,8 @@ def look(
     Returns:
         1 when a setting or missing poses forbid a take-off, else 0.
     """
+    bridge.look(time.monotonic())  # the first step takes long, and what comes meanwhile may be too much for one reading
+    source.read(time.monotonic())
     end, poses, refused = time.monotonic() + LOOK_S, list[Sample](), source.refused
     times: list[set[float]] = [set() for _ in bridge.cameras]
     while (now := time.monotonic()) < end:
