@@ -90,9 +90,10 @@ def building(name: str, mass: float) -> list[str]:
         f"    cp src/e2efly/vehicles/parts/{name}.toml parts.toml    # with the masses of your own scale",
         f"    e2efly build parts.toml --vehicle {name} --mass {mass:.3f} 0.002 --out mine",
         "",
-        "`--mass` is the whole vehicle with its battery, kg, and the standard deviation of the scale. The command writes",
-        "`mine/vehicle.toml`, takes or trains a policy for each of the six tasks, and says how often each succeeds on that",
-        "vehicle ([from parts to policies](vehicles.md#from-parts-to-policies)). The masses of the parts set the inertia.",
+        "`--mass` is that of the whole vehicle with its battery, kg, and the scale's standard deviation.",
+        "The masses of the parts set the inertia. The command writes `mine/vehicle.toml`, takes or trains",
+        "a policy for each of the six tasks, and says how often each succeeds on that vehicle",
+        "([more](vehicles.md#from-parts-to-policies)).",
     ]
 
 
