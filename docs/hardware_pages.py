@@ -79,7 +79,22 @@ def made(name: str) -> str:
     things = [*((str(i), part.purchase) for i, part in enumerate(parts, 1)), *zip("abcdefgh", ground, strict=False)]
     lines += [f"- **{mark}** {note}" for mark, thing in things if (note := notes(thing))]
     lines += ["", "### Sums", "", *markdown(sums(name, parts, ground)), "", "### With the battery", ""]
-    return "\n".join([*lines, *markdown(flown(vehicle, parts))])
+    return "\n".join([*lines, *markdown(flown(vehicle, parts)), "", *building(name, prototype(parts).mass)])
+
+
+def building(name: str, mass: float) -> list[str]:
+    """How the list becomes a vehicle file and policies."""
+    return [
+        "### From parts to policies",
+        "",
+        f"    cp src/e2efly/vehicles/parts/{name}.toml parts.toml    # with the masses of your own scale",
+        f"    e2efly build parts.toml --vehicle {name} --mass {mass:.3f} 0.002 --out mine",
+        "",
+        "`--mass` is that of the whole vehicle with its battery, kg, and the scale's standard deviation.",
+        "The masses of the parts set the inertia. The command writes `mine/vehicle.toml`, takes or trains",
+        "a policy for each of the six tasks, and says how often each succeeds on that vehicle",
+        "([more](vehicles.md#from-parts-to-policies)).",
+    ]
 
 
 def bought(thing: Purchase, mass: float | None = None) -> dict[str, Any]:

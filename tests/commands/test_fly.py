@@ -103,6 +103,7 @@ def test_a_craft_s_name_is_neither_markup_nor_an_escape_sequence(capsys: pytest.
     said = capsys.readouterr().out
     assert "\x1b" not in said
     assert "[/]" in said
+    assert "none has come" in said and "not compared: no poses" in said and "estimated from the poses" not in said
 
 
 def test_the_policy_of_the_goal_s_options_is_looked_for_in_no_device(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Every option that a documented command has is one that the command takes."""
+"""Every option that a documented command has is one that the command takes, and the commands of a flight parse."""
 
 import contextlib
 import io
@@ -10,24 +10,31 @@ from pathlib import Path
 import pytest
 
 from e2efly.commands.cli import run
+from e2efly.commands.options import of_command
 from e2efly.config import ALGORITHMS
 from e2efly.tasks import TASKS
 from tests.docs.pages import DOCS, ROOT
 
 PAGES = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md"))]
+FLIGHT = [
+    DOCS / name for name in ("hardware.md", "hardware-vis-r.md", "hardware-vis-h.md", "flying.md", "tutorials/fly.md")
+]
+"""The pages that a lab follows to its first flight."""
 FREE = ("--env.", "--task.", "--goal.", "--reward.")
 """Options of a policy's task: which there are, its contract says."""
 
 
 def commands(page: Path) -> list[list[str]]:
-    """The words of each command line of e2efly on a page, comments and `...` left out."""
+    """The words of each command line of e2efly on a page, without comments. `...` is left where it stands for the value
+    of an option.
+    """
     text = page.read_text(encoding="utf-8").replace("\\\n", " ")
     lines = re.findall(r"^(?:    |        |\$ |)e2efly (\S[^\n]*)$|`e2efly (\S[^`\n]*)`", text, re.MULTILINE)
     found = []
     for line in (fenced or inline for fenced, inline in lines):
         with contextlib.suppress(ValueError):  # a quote that a sentence does not close
             words = shlex.split(line.split("  #")[0].split(" # ")[0])
-            found.append([word for word in words if word != "..."])
+            found.append([word for i, word in enumerate(words) if word != "..." or words[i - 1].startswith("--")])
     return found
 
 
@@ -56,6 +63,16 @@ def test_documented_options_exist(page: Path) -> None:
                 continue
             said = known(words)
             assert re.search(rf"(?<![\w-]){re.escape(flag)}(?![\w.-])", said), f"e2efly {shlex.join(words)}: no {flag}"
+
+
+@pytest.mark.parametrize("page", FLIGHT, ids=lambda path: path.stem)
+def test_the_commands_of_a_flight_parse(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With their values, and whatever the reader puts in place of `...`."""
+    monkeypatch.chdir(tmp_path)
+    whole = [words for words in commands(page) if len(words) > 1 and not words[-1].startswith("--help")]
+    assert whole
+    for name, *arguments in whole:
+        of_command(name, arguments)
 
 
 def test_commands_are_found() -> None:

@@ -51,6 +51,7 @@ def test_a_source_that_falls_silent_is_told_with_its_own_problem() -> None:
     late = see(good(), [], HOVER, None, 51.0, "connection refused")
     assert late.pose_problem == "the newest is 0.51 s old (connection refused)"
     assert late.heading_error is None
+    assert see(StateEstimate(Checks(), 0.1), [], GROUND, None, 51.0).pose_problem == "none has come"
 
 
 @pytest.mark.parametrize(("flight", "flies_again"), [(GROUND, True), (HOVER, False)])

@@ -17,6 +17,7 @@ from e2efly.flight.pilot.fence import fence_problem, moved, stopping
 from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.flight.pilot.hover import blind_time
 from e2efly.flight.pilot.landing import BEYOND_S, FAST, FOUND_S, SLOWED_S, has_stood
+from e2efly.flight.pilot.refusals import take_off_refusals
 from e2efly.flight.pilot.state_machine import AHEAD, FALLEN_S, LONGEST_STEP, NEAR_GROUND, step
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
@@ -252,7 +253,17 @@ def test_every_unmet_condition_is_named_at_once() -> None:
         assert said(flight, reason)
     assert "settings: a" in flight.reasons and "settings: b" in flight.reasons
     everything = flown(Flight(), Inputs())
-    assert len(everything.reasons) == 6  # what is not known is a refusal, too
+    assert len(everything.reasons) == 5  # what is not known is a refusal, too
+
+
+def test_nothing_is_blamed_that_another_condition_explains() -> None:
+    """As `--check` asks: no step was flown."""
+    assert take_off_refusals(SETTINGS, Flight(), having(armed=False)) == (Reason.NOT_ARMED,)  # the switch is low
+    tilted = having(odometry=at(roll=0.5), accelerometer_problem="29 deg from the body's z axis")
+    (only,) = take_off_refusals(SETTINGS, Flight(), tilted)
+    assert only.startswith(Reason.TILTED)
+    blind = take_off_refusals(SETTINGS, Flight(), having(odometry=None, attitude_error=None))
+    assert blind == (f"{Reason.NO_ODOMETRY}: none came yet",)  # there is nothing to compare attitudes with
 
 
 def test_a_whole_flight() -> None:

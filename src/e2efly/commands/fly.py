@@ -306,7 +306,8 @@ def run(options: Fly) -> int:
         path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
         if excited:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
-        say(f"Next: e2efly fly-report {path}; throttle map: {path.with_suffix('.throttle.json')}")
+        learned = f"factor {bridge.map.scale:.2f}, {path.with_suffix('.throttle.json')}"
+        say(f"Next: e2efly fly-report {path}; throttle map: {learned}")
         return 0
 
 

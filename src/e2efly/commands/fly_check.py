@@ -13,6 +13,7 @@ from e2efly.flight.betaflight.messages import StatusEx
 from e2efly.flight.betaflight.row import Row, command_lines, problems
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander
+from e2efly.flight.pilot.flight_state import Mission
 from e2efly.flight.pilot.hover import roll_pitch
 from e2efly.flight.pilot.refusals import take_off_refusals
 from e2efly.flight.pose.pose_source import PoseSource
@@ -30,6 +31,8 @@ LOOK_S = 1.5
 """How long `--check` watches poses and receiver, s."""
 STATUS_S, STATUSES = 1.0, 3
 """Time, s, and number of messages in which the controller may report whether it is armed, before a bridge begins."""
+POSITIONS = {Mission.LAND: "low", Mission.HOVER: "middle", Mission.POLICY: "high"}
+"""The positions of the mission switch."""
 PICTURES = Path("flights")
 """Folder in which `--check` puts pictures of the input images of the network."""
 
@@ -75,7 +78,9 @@ def look(
     Returns:
         1 when a setting or missing poses forbid a take-off, else 0.
     """
-    end, poses = time.monotonic() + LOOK_S, list[Sample]()
+    bridge.look(time.monotonic())  # the first step takes long, and what comes meanwhile may be too much for one reading
+    source.read(time.monotonic())
+    end, poses, refused = time.monotonic() + LOOK_S, list[Sample](), source.refused
     times: list[set[float]] = [set() for _ in bridge.cameras]
     while (now := time.monotonic()) < end:
         poses += bridge.look(now)
@@ -83,8 +88,9 @@ def look(
             taken |= {seen.frame.time} if seen.frame is not None else set()
         time.sleep(0.005)
     table = Table(box=None, show_header=False, pad_edge=False)
-    _add_poses(table, bridge, source, poses)
-    add_lags(table, bridge, poses, contract)
+    _add_poses(table, bridge, source, poses, source.refused - refused)
+    if bridge.odometry is not None:
+        add_lags(table, bridge, poses, contract)
     add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
@@ -92,11 +98,12 @@ def look(
     heard = "not heard"
     if pilot is not None:
         sticks = ", ".join(f"{name} {getattr(pilot, name):+.2f}" for name in ("roll", "pitch", "throttle", "yaw"))
-        heard = f"mission {pilot.mission}; {sticks}"
+        heard = f"mission {POSITIONS[pilot.mission]} ({pilot.mission}); {sticks}"
     table.add_row("receiver", heard)
     table.add_row("battery", f"{bridge.inputs.voltage:.2f} V per cell" if bridge.inputs.voltage else "unknown")
     error = bridge.inputs.attitude_error
-    table.add_row("attitude", "not heard" if error is None else f"controller and poses differ by {error:.3f} rad")
+    unknown = "not compared: no poses" if bridge.odometry is None else "not heard"
+    table.add_row("attitude", unknown if error is None else f"controller and poses differ by {error:.3f} rad")
     print_table(console, table)
     refusals = take_off_refusals(bridge.settings, bridge.flight, bridge.inputs)
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
@@ -129,7 +136,7 @@ def refuse_in_flight(bridge: Bridge) -> None:
         )
 
 
-def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sample]) -> None:
+def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sample], refused: int) -> None:
     o = bridge.odometry
     if o is None:
         table.add_row("poses", _cell(f"none good from {source.describe()}: {bridge.inputs.odometry_problem}"))
@@ -137,7 +144,7 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
     roll, pitch = roll_pitch(o.quaternion)
     age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
     pace = bridge.estimate.pace
-    said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {source.refused}"
+    said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {refused}"
     table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
     table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
     if poses and poses[-1].stamp is not None:

@@ -132,7 +132,8 @@ def see(
     old = age(after.track, now)
     if after.refused is not None or old <= after.checks.max_age:
         return replace(after, stale=None)
-    return replace(after, stale=f"the newest is {old:.2f} s old" + (f" ({said})" if said else ""))
+    late = f"the newest is {old:.2f} s old" if math.isfinite(old) else "none has come"
+    return replace(after, stale=late + (f" ({said})" if said else ""))
 
 
 def _accept(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from e2efly.flight.pilot.fence import fence_problem
-from e2efly.flight.pilot.flight_state import Flight, Inputs, Pilot, Reason
+from e2efly.flight.pilot.flight_state import Flight, Inputs, Mission, Pilot, Reason
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry, tilt_of
 
@@ -22,12 +22,12 @@ def take_off_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs) 
         reasons.append(inputs.blindness)
     if inputs.link_problem:
         reasons.append(f"{Reason.LINK}: {inputs.link_problem}")
-    error = inputs.attitude_error
-    if error is None:
+    error, level = inputs.attitude_error, inputs.seen is None or tilt_of(inputs.seen.quaternion) <= LEVEL
+    if error is None and inputs.odometry is not None:
         reasons.append(f"{Reason.ATTITUDE}: the controller's is not known")
-    elif not error <= settings.attitude_agreement:
+    elif error is not None and not error <= settings.attitude_agreement:
         reasons.append(f"{Reason.ATTITUDE}: by {math.degrees(error):.0f} deg")
-    if inputs.accelerometer_problem:
+    if inputs.accelerometer_problem and level:  # gravity is where it should be only if the vehicle is level
         reasons.append(f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}")
     if inputs.motion_problem:
         reasons.append(f"{Reason.MOTION}: {inputs.motion_problem}")
@@ -35,7 +35,7 @@ def take_off_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs) 
     reasons += _sticks(settings, inputs.pilot, Reason.STICKS)
     if inputs.pilot is None:
         reasons.append(Reason.NO_PILOT)
-    elif flight.rearm:
+    elif flight.rearm and inputs.pilot.mission is not Mission.LAND:
         reasons.append(Reason.MISSION_NOT_LOW)
     reasons += [f"{Reason.SETTINGS}: {problem}" for problem in inputs.settings_problems]
     if not inputs.armed:
