@@ -8,7 +8,7 @@ import pytest
 
 import e2efly
 from e2efly.flight.sight.image_source import Frame
-from e2efly.flight.sight.quality import FROZEN, WRONG, SeenImages, see
+from e2efly.flight.sight.quality import FROZEN, LEVEL, MOUNTED, TURNING, WRONG, SeenImages, see
 from e2efly.policy.odometry import Odometry
 
 CAMERA = e2efly.load_policy("avoid").contract.images[0]
@@ -105,3 +105,16 @@ def test_a_camera_that_hangs_upside_down_sees_farther_than_the_ground(height: fl
         for k in range(WRONG):
             quiet = see(quiet, [Frame(0.03 * k, (1 - 0.001 * k) * ground(height)[::-1])], 0.03 * k, pose)
         assert quiet.problem(0.03 * (WRONG - 1)) is None
+
+
+@pytest.mark.parametrize("height", [0.8, 1.2, 1.6])
+def test_a_camera_as_in_the_training_never_sees_farther_than_the_ground(height: float) -> None:
+    """Off its mount, and with images that are older than the pose of a vehicle that turns:
+    at each attitude of a flight at the height of a room.
+    """
+    for pitch in np.linspace(-LEVEL, LEVEL, 41):
+        for rate in (-TURNING, -0.4, 0.0, 0.4, TURNING):
+            pose = dataclasses.replace(level(height, pitch), body_rate=np.array([0.0, rate, 0.0]))
+            for age in (0.0, 0.034, CAMERA.latency_range_s[1]):
+                picture = ground(height, pitch - rate * age - MOUNTED)
+                assert see(SeenImages(CAMERA), [Frame(0.0, picture)], age, pose).wrong == 0
