@@ -45,11 +45,9 @@ IN_ROOM: dict[str, tuple[str, dict[str, Any]]] = {
     "race, 3 m/s": ("race_speed", {**RACE, "speed": 3.0}),
     "race, fastest": ("race_speed", RACE),
     "land_visual": ("land_visual", {}),
-    "race_clutter": ("runs/race_clutter-room", {}),
+    "race_clutter": ("race_clutter_room", {}),
 }
-"""Policy and goal of each row. The last is a run by the command of docs/hil.md, "A small room"."""
-WORLD = {"speed": (1.5, 2.5), "gate_position": 0.1, "gate_yaw": 0.1}
-"""The worlds of race_clutter in the room: options of its task."""
+"""Policy and goal of each row."""
 
 
 def main() -> None:
@@ -84,8 +82,7 @@ def main() -> None:
 
 def flown_of(task: str, policy: str, goal: dict[str, Any], args: Namespace) -> tuple[str, list[Rehearsal]]:
     """The flights of a row, and what is to be said before them."""
-    world = WORLD if args.room and task == "race_clutter" else None
-    found, vehicle = candidate(policy, args.vehicle, task=world), load_vehicle(args.vehicle)
+    found, vehicle = candidate(policy, args.vehicle), load_vehicle(args.vehicle)
     if not args.room:
         return "", fly_whole(found, vehicle, args.flights, Console(quiet=True))
     route, flown = route_of(found.policy.contract)(**goal), list[Rehearsal]()

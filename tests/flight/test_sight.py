@@ -109,8 +109,8 @@ def test_a_camera_that_hangs_upside_down_sees_farther_than_the_ground(height: fl
 
 @pytest.mark.parametrize("height", [0.8, 1.2, 1.6])
 def test_a_camera_as_in_the_training_never_sees_farther_than_the_ground(height: float) -> None:
-    """Off its mount, and with images that are older than the pose of a vehicle that turns:
-    at each attitude of a flight at the height of a room.
+    """Off its mount, and with images older than the pose of a vehicle that turns: at each attitude, as high as in a
+    room.
     """
     for pitch in np.linspace(-LEVEL, LEVEL, 41):
         for rate in (-TURNING, -0.4, 0.0, 0.4, TURNING):

@@ -150,8 +150,8 @@ def _shows(camera: Image, image: np.ndarray) -> bool:
 
 def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float, age: float) -> bool | None:
     """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is tilted up by
-    `MOUNTED` more than it should be, and if the vehicle has turned down since the exposure, `age` s ago. None: the image
-    cannot tell.
+    `MOUNTED` more than it should be, and if the vehicle has turned down in the `age` s since the exposure. None: the
+    image cannot tell.
     """
     turning = float(np.linalg.norm(odometry.body_rate))
     usable = camera.sees == "depth" and camera.projection == "pinhole" and turning <= TURNING
