@@ -19,7 +19,7 @@ from e2efly.validation.evaluation import candidate
 from e2efly.validation.hil_lap import Lap, SceneChange, Spread, Truth, verdict
 from e2efly.validation.link_process import DelayLine
 from e2efly.validation.mocap_process import ATTITUDE, POSITION, Marks, MocapCamera
-from e2efly.validation.processes import Program, Unready, flags
+from e2efly.validation.processes import NotReadyError, Program, flags
 from e2efly.validation.rehearse_hil import LOOP_S, Drawn, RehearsalPlan, draw, unlike
 
 POSE = {"position": [1.0, 2.0, 3.0], "quaternion": [0.6, 0.0, 0.8, 0.0], "velocity": [0, 0, 0], "stamp": 5.0}
@@ -165,7 +165,7 @@ def test_what_is_unlike_the_documented_end_is_told() -> None:
 
 def test_a_program_that_fails_tells_its_last_words() -> None:
     with Program("the node", ["-c", "print('one'); raise SystemExit('no images')"]) as node:
-        with pytest.raises(Unready, match=r"the node did not come to 'ready'.*no images") as error:
+        with pytest.raises(NotReadyError, match=r"the node did not come to 'ready'.*no images") as error:
             node.ready("ready", 20.0)
         assert "'one'" in str(error.value)
     assert node.process.poll() is not None

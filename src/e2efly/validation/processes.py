@@ -72,7 +72,7 @@ def _text(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
-class Unready(RuntimeError):
+class NotReadyError(RuntimeError):
     """A program was not ready in its time. What it was started for has not begun."""
 
 
@@ -144,13 +144,13 @@ class Program:
         """Wait until it prints a text, by which it is ready. Returns the line.
 
         Raises:
-            Unready: when it does not, with the time that it had, of the clock and of a processor, and its last lines.
+            NotReadyError: when it does not, with its time by the clock and by a processor, and its last lines.
         """
         try:
             return self.wait_for(text, seconds)
         except RuntimeError as error:
             had = f"{seconds:g} s, in which it had a processor for {_computed(self.process.pid):.0f} s"
-            raise Unready(f"{self.name} was not ready within {had}: {error}") from None
+            raise NotReadyError(f"{self.name} was not ready within {had}: {error}") from None
 
     def end_told(self) -> str:
         """How it has ended, if it has ended, and its last lines."""
@@ -226,7 +226,7 @@ class Room:
         given. Without a port, the poses go to a free one.
 
         Raises:
-            Unready: when it does not start, with its last lines.
+            NotReadyError: when it does not start, with its last lines.
         """
         self.pose_port = free_port() if pose_port is None else pose_port
         """Port to which its poses go."""
@@ -326,7 +326,7 @@ def take_off(room: Room, flies: Program) -> None:
     """Hand over control, arm, and hover. The pilot repeats steps that fail on a busy machine.
 
     Raises:
-        RuntimeError: when the bridge does not take off, with its last lines; `Unready`, when it does not start.
+        RuntimeError: when the bridge does not take off, with its last lines; `NotReadyError`, when it does not start.
     """
     flies.ready("INIT")
     room.set(override=True, throttle=0.0)

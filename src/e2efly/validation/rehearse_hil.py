@@ -29,9 +29,9 @@ from e2efly.validation.processes import (
     FLIGHT_S,
     START_S,
     TAKEN,
+    NotReadyError,
     Program,
     Room,
-    Unready,
     Victim,
     bridge,
     flags,
@@ -171,7 +171,7 @@ def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None =
     try:
         with ExitStack() as stack:
             _Flight(plan, drawn, seed, folder, heard, stack).fly(kill)
-    except Unready as error:
+    except NotReadyError as error:
         return Lap(seed, kill, begun=False, told="not begun", problems=(str(error),))
     except (RuntimeError, OSError) as error:
         heard.problems.append(str(error))
