@@ -22,6 +22,7 @@ from e2efly.policy.zoo import FOLDER, USUAL, beside, config_file, contents, is_p
 from e2efly.runs.inputs import from_json
 from e2efly.simulation.device import wide_vectors
 from e2efly.tasks import TASKS
+from e2efly.tasks.route import usual_route
 from e2efly.validation import evaluation
 from e2efly.validation.stress import stress
 from e2efly.vehicles.family import family_names
@@ -54,6 +55,12 @@ def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> 
     file = policy_file(task, vehicle)
     config = from_json(json.loads(config_file(file).read_text()), "")
     assert contract_of(Setup.of(config).env, config) == evaluation.load_policy(file).contract
+
+
+def test_a_policy_was_trained_for_what_it_flies_without_options() -> None:
+    for vehicle, task in POLICIES:
+        contract = evaluation.load_policy(policy_file(task, vehicle)).contract
+        assert contract.outside(usual_route(contract).domain()) == (), (vehicle, task)
 
 
 def test_a_vehicle_has_one_mount_for_all_that_look_ahead_and_the_builder_is_told_it() -> None:
