@@ -5,19 +5,20 @@
 
 All nine tasks; what policies by sight see is rendered at the body's true pose, in another world of the training's
 each time. Time is virtual: the figures do not depend on the machine. The firmware is built where need be. Rows of tasks
-that are not named stay as they are in the file.
+that are not named stay as they are in the file, with their flights.
 
 With `--room` the paper's six tasks fly in a room of 6x6x3 m, inside its fence, which ends a policy's flight before the
 vehicle leaves it. The fastest race is that of the highest speed of `SPEEDS` at which each flight succeeds.
 """
 
 import dataclasses
+import json
 import time
 from argparse import Namespace
 from typing import Any
 
 import numpy as np
-from common import arguments, table, with_earlier, write
+from common import RESULTS, arguments, table, with_earlier, write
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flight_row, fly_whole
@@ -56,7 +57,8 @@ def main() -> None:
     known, name = (IN_ROOM, "room_flights") if args.room else (TASKS, "firmware_flights")
     compute_at_once()
     prepare("cpu")
-    rows, flights = [], {}
+    path = args.json or RESULTS / f"{name}.json"
+    rows, flights = [], json.loads(path.read_text())["flights"] if path.exists() else {}
     for task in known if args.tasks == [""] else args.tasks:
         began = time.perf_counter()
         told, flown = flown_of(task, *known[task], args)
