@@ -281,7 +281,7 @@ def test_what_to_look_at_circles_the_target(contracts: dict[str, Contract]) -> N
 
 
 @pytest.mark.whole(but=1)
-@pytest.mark.parametrize("task", list(TASKS))
+@pytest.mark.parametrize("task", [name for name, task in TASKS.items() if "world" in vars(task)])
 def test_what_training_shows_and_judges_flight_shows_and_judges(task: str) -> None:
     """The same code in NumPy and float64: fields, errors and verdicts of 64 vehicles that fly until they fail."""
     config = presets.preset(task, "ppo")
@@ -316,7 +316,7 @@ def test_what_training_shows_and_judges_flight_shows_and_judges(task: str) -> No
         lost |= np.asarray(wanted.terminated)
         ends += int(np.sum(wanted.terminated))
         state = dataclasses.replace(reached)
-    assert ends > 0 or task.startswith(("avoid", "race_clutter"))
+    assert ends > 0 or task in ("avoid", "race_clutter")
 
 
 @pytest.mark.parametrize("name", ["four_gates", "circle_3d", "s_shaped", "j_shaped"])
