@@ -31,11 +31,12 @@ BEYOND_M = 0.2
 """The distance that is added, m."""
 MOST = 0.7
 """Share of the lowest row that has to be too far away for an image to contradict the ground."""
-WRONG = 10
+WRONG = 5
 """After this many images in a row that contradict the ground, the camera is mounted differently, upside down for
 example."""
-MOUNTED = 0.06
-"""How far a camera may be off its mount, rad: as far as in the training of the preset `robust`."""
+MOUNTED, FIELD = 0.06, 0.04
+"""How far a camera may be off its mount, rad, and by which share its field of view may be smaller: as in the training
+of the preset `robust`."""
 STANDING = 0.2
 """Height of a camera over the ground below which the vehicle may stand on something, m."""
 LEVEL, TURNING = 0.35, 1.0
@@ -149,9 +150,9 @@ def _shows(camera: Image, image: np.ndarray) -> bool:
 
 
 def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float, age: float) -> bool | None:
-    """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is tilted up by
-    `MOUNTED` more than it should be, and if the vehicle has turned down in the `age` s since the exposure. None: the
-    image cannot tell.
+    """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is off by
+    `MOUNTED` and `FIELD`, and if the vehicle has turned down in the `age` s since the exposure. None: the image cannot
+    tell.
     """
     turning = float(np.linalg.norm(odometry.body_rate))
     usable = camera.sees == "depth" and camera.projection == "pinhole" and turning <= TURNING
@@ -167,7 +168,7 @@ def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: f
     height = float(odometry.position[2]) + float(place.z) - ground
     if height < STANDING:
         return None
-    higher = MOUNTED + turning * max(age, 0.0)
+    higher = MOUNTED - FIELD * low + turning * max(age, 0.0)
     depth = height / np.maximum(-np.asarray(rays.z) - higher, 1e-6)
     told = (depth > camera.reach_m[0]) & (depth * BEYOND + BEYOND_M < camera.reach_m[1]) & (image[-1] > 0)
     if told.mean() < MOST:
