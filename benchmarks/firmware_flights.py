@@ -5,19 +5,20 @@
 
 All nine tasks; what policies by sight see is rendered at the body's true pose, in another world of the training's
 each time. Time is virtual: the figures do not depend on the machine. The firmware is built where need be. Rows of tasks
-that are not named stay as they are in the file.
+that are not named stay as they are in the file, with their flights.
 
 With `--room` the paper's six tasks fly in a room of 6x6x3 m, inside its fence, which ends a policy's flight before the
 vehicle leaves it. The fastest race is that of the highest speed of `SPEEDS` at which each flight succeeds.
 """
 
 import dataclasses
+import json
 import time
 from argparse import Namespace
 from typing import Any
 
 import numpy as np
-from common import arguments, table, with_earlier, write
+from common import RESULTS, arguments, table, with_earlier, write
 from rich.console import Console
 
 from e2efly.commands.rehearsals import flight_row, fly_whole
@@ -45,11 +46,9 @@ IN_ROOM: dict[str, tuple[str, dict[str, Any]]] = {
     "race, 3 m/s": ("race_speed", {**RACE, "speed": 3.0}),
     "race, fastest": ("race_speed", RACE),
     "land_visual": ("land_visual", {}),
-    "race_clutter": ("runs/race_clutter-room", {}),
+    "race_clutter": ("race_clutter_room", {}),
 }
-"""Policy and goal of each row. The last is a run by the command of docs/hil.md, "A small room"."""
-WORLD = {"speed": (1.5, 2.5), "gate_position": 0.1, "gate_yaw": 0.1}
-"""The worlds of race_clutter in the room: options of its task."""
+"""Policy and goal of each row."""
 
 
 def main() -> None:
@@ -58,7 +57,8 @@ def main() -> None:
     known, name = (IN_ROOM, "room_flights") if args.room else (TASKS, "firmware_flights")
     compute_at_once()
     prepare("cpu")
-    rows, flights = [], {}
+    path = args.json or RESULTS / f"{name}.json"
+    rows, flights = [], json.loads(path.read_text())["flights"] if path.exists() else {}
     for task in known if args.tasks == [""] else args.tasks:
         began = time.perf_counter()
         told, flown = flown_of(task, *known[task], args)
@@ -84,8 +84,7 @@ def main() -> None:
 
 def flown_of(task: str, policy: str, goal: dict[str, Any], args: Namespace) -> tuple[str, list[Rehearsal]]:
     """The flights of a row, and what is to be said before them."""
-    world = WORLD if args.room and task == "race_clutter" else None
-    found, vehicle = candidate(policy, args.vehicle, task=world), load_vehicle(args.vehicle)
+    found, vehicle = candidate(policy, args.vehicle), load_vehicle(args.vehicle)
     if not args.room:
         return "", fly_whole(found, vehicle, args.flights, Console(quiet=True))
     route, flown = route_of(found.policy.contract)(**goal), list[Rehearsal]()

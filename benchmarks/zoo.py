@@ -58,7 +58,7 @@ from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 VARIANTS = {"race_any": ("race", "any_track")}
 """Policies of a task by a preset of its own: task and preset."""
-USUAL_ALONE = tuple(VARIANTS)
+USUAL_ALONE = (*VARIANTS, "race_clutter_room")
 """For the usual vehicle alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
@@ -141,7 +141,14 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     shutil.copy(policy, kept)
     if (seen := samples_file(policy)).is_file():
         shutil.copy(seen, samples_file(kept))
-    write_json(config_file(kept), to_json(RunDirectory(policy.parent).config()), indent=None)
+    config = RunDirectory(policy.parent).config()
+    if config.start_from is not None:  # a policy of the zoo: by its name, wherever the zoo is
+        digest = hashlib.sha256(Path(config.start_from).read_bytes()).hexdigest()
+        named = (
+            f"{whose}/{name}" for whose, has in contents().items() for name in has if has[name]["sha256"] == digest
+        )
+        config = dataclasses.replace(config, start_from=next(named))
+    write_json(config_file(kept), to_json(config), indent=None)
     curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
     zoo.setdefault(vehicle, {})[task] = about

@@ -182,10 +182,8 @@ the vehicle. Motion capture, HIL node, bridge with watchdog, radio and firmware 
 two cores. Times are the median / 99 % of the worst lap. In the second table each process is killed once
 in flight. [How the rehearsal works](hil.md#rehearse-it-first).""",
     "hil_room": """
-As above, for VIS-R. Three of the 20 laps were not begun ([why](hil.md#a-small-room)). The fence is that of the
-room in which [whole
-flights](#the-papers-six-tasks-through-real-betaflight-firmware-in-a-room-of-6x6-m) are flown. Other programs ran on
-the same two cores. [The policy and its worlds](hil.md#a-small-room).""",
+As above, for VIS-R in [a small room](hil.md#a-small-room). The fence is that of the room in which [whole
+flights](#the-papers-six-tasks-through-real-betaflight-firmware-in-a-room-of-6x6-m) are flown.""",
     "identify_betaflight": """
 Each log has 30 s of `e2efly fly excitation`, in a fence of 12 x 12 x 4.8 m, flown by the bridge through
 Betaflight 4.6 in virtual time. The true delay is measured by the rig's own clock: the age of the poses, and

@@ -16,6 +16,7 @@ from e2efly.config.env import FILE, STILL
 from e2efly.config.storage import read_json
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.zoo import USUAL, config_file, contents, policy_file
+from e2efly.runs import presets
 from e2efly.runs.inputs import from_json
 from e2efly.vehicles.family import load_family
 
@@ -32,6 +33,7 @@ TASKS = {
     "land_visual": "Land on a pad that only a camera shows.",
     "avoid": "Fly fast through a forest that only a depth camera shows.",
     "race_clutter": "Race among obstacles that only a depth camera shows.",
+    "race_clutter_room": "The same in a room of 6x6 m, at the speed of a room ([a small room](hil.md#a-small-room)).",
 }
 VEHICLES = {
     "any": "Any quadrotor",
@@ -95,7 +97,7 @@ def flies_by(policy: Policy) -> str:
 def configured(policy: Path) -> TrainConfig:
     """The configuration by which a policy was trained, on any number of devices."""
     file = config_file(policy)
-    return dataclasses.replace(from_json(read_json(file), str(file)), devices=None)
+    return presets.begun(dataclasses.replace(from_json(read_json(file), str(file)), devices=None))
 
 
 def made_by(command: str, config: TrainConfig) -> str:

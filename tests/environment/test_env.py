@@ -30,7 +30,7 @@ def make(task: TaskConfig | None = None, **config: Any) -> Env:
 
 
 @pytest.mark.whole(but=1)
-@pytest.mark.parametrize("name", list(TASKS))
+@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if "world" in vars(task)])
 def test_starts_are_where_the_task_says(name: str) -> None:
     env = make(TASKS[name].training())
     state, observation = reset(env, random_key(0), 2000)

@@ -22,6 +22,7 @@ from e2efly.policy.zoo import FOLDER, USUAL, beside, config_file, contents, is_p
 from e2efly.runs.inputs import from_json
 from e2efly.simulation.device import wide_vectors
 from e2efly.tasks import TASKS
+from e2efly.tasks.route import usual_route
 from e2efly.validation import evaluation
 from e2efly.validation.stress import stress
 from e2efly.vehicles.family import family_names
@@ -56,6 +57,12 @@ def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> 
     assert contract_of(Setup.of(config).env, config) == evaluation.load_policy(file).contract
 
 
+def test_a_policy_was_trained_for_what_it_flies_without_options() -> None:
+    for vehicle, task in POLICIES:
+        contract = evaluation.load_policy(policy_file(task, vehicle)).contract
+        assert contract.outside(usual_route(contract).domain()) == (), (vehicle, task)
+
+
 def test_a_vehicle_has_one_mount_for_all_that_look_ahead_and_the_builder_is_told_it() -> None:
     """Of tasks as of policies: the camera that a builder mounts serves each."""
     recipes = {(camera.pitch, camera.position) for task in TASKS.values() for camera in task.cameras}
@@ -72,7 +79,8 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     """Rows that failed in every start of a policy without a memory, of all vehicles, and what zoo.json says of them."""
     robust = [(vehicle, task) for vehicle, task in POLICIES if "stress" in contents()[vehicle][task]]
     assert {task for _, task in robust} == {
-        "avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter", "track",
+        "avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter",
+        "race_clutter_room", "track",
     }  # fmt: skip
     for vehicle, task in robust:
         stated = contents()[vehicle][task]["stress"]

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from e2efly.commands.cli import run
+from e2efly.commands.hil_rehearsal import told
 from e2efly.courses.origin import Origin
 from e2efly.courses.tracks import load_track, track_text
 from e2efly.flight.pose.json_source import parse_pose
 from e2efly.flight.settings import Fence, FlightSettings
+from e2efly.validation import rehearse_hil
 from e2efly.validation.evaluation import candidate
 from e2efly.validation.hil_lap import Lap, SceneChange, Spread, Truth, verdict
 from e2efly.validation.link_process import DelayLine
 from e2efly.validation.mocap_process import ATTITUDE, POSITION, Marks, MocapCamera
-from e2efly.validation.processes import Program, flags
+from e2efly.validation.processes import NotReadyError, Program, flags
 from e2efly.validation.rehearse_hil import LOOP_S, Drawn, RehearsalPlan, draw, unlike
 
 POSE = {"position": [1.0, 2.0, 3.0], "quaternion": [0.6, 0.0, 0.8, 0.0], "velocity": [0, 0, 0], "stamp": 5.0}
@@ -163,10 +165,29 @@ def test_what_is_unlike_the_documented_end_is_told() -> None:
 
 def test_a_program_that_fails_tells_its_last_words() -> None:
     with Program("the node", ["-c", "print('one'); raise SystemExit('no images')"]) as node:
-        with pytest.raises(RuntimeError, match=r"the node did not come to 'ready'.*no images") as error:
-            node.wait_for("ready", 20.0)
+        with pytest.raises(NotReadyError, match=r"the node did not come to 'ready'.*no images") as error:
+            node.ready("ready", 20.0)
         assert "'one'" in str(error.value)
     assert node.process.poll() is not None
+
+
+def test_a_lap_for_which_a_process_was_not_ready_was_not_begun_and_counts_as_none(
+    race: tuple[RehearsalPlan, Drawn], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Program("the node", ["-c", "import time; print('compiles'); time.sleep(60)"]) as node:
+
+        def starts(*_: object) -> None:
+            node.ready("ready", 1.0)
+
+        monkeypatch.setattr(rehearse_hil, "_Flight", starts)
+        lap = rehearse_hil.rehearse(race[0], 4, tmp_path / "flight")
+    (problem,) = lap.problems
+    assert problem.startswith("the node was not ready within 1 s, in which it had a processor for 0 s: ")
+    assert "compiles" in problem
+    assert not lap.begun and not lap.good
+    said = told([lap, Lap(5, success=True)])
+    assert "1 of 1 flights with success." in said
+    assert "1 of 2 flights were not begun, and count as none." in said and f"world 4: {problem}" in said
 
 
 def test_options_without_effect_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -118,8 +118,9 @@ def rehearse(o: Hil, task: dict[str, Any], origin: Origin, fence: Fence | None) 
 
 def as_json(laps: "list[Lap]") -> dict[str, Any]:
     """The report."""
-    good = sum(lap.success for lap in laps)
-    return {"flights": len(laps), "success": good, "laps": [lap.as_json() for lap in laps]}
+    good, begun = sum(lap.success for lap in laps), sum(lap.begun for lap in laps)
+    not_begun = len(laps) - begun
+    return {"flights": begun, "not_begun": not_begun, "success": good, "laps": [lap.as_json() for lap in laps]}
 
 
 def laps_table(laps: "list[Lap]") -> Table:
@@ -137,8 +138,10 @@ def told(laps: "list[Lap]") -> list[str]:
     """The remarks under the table."""
     lines = ["Times: 99 % of them are shorter, ms. Medians and maxima are in the report."]
     if any(lap.kill is None for lap in laps):
-        whole = [lap for lap in laps if lap.kill is None]
+        whole = [lap for lap in laps if lap.kill is None and lap.begun]
         lines.append(f"{sum(lap.success for lap in whole)} of {len(whole)} flights with success.")
+    if missing := sum(not lap.begun for lap in laps):
+        lines.append(f"{missing} of {len(laps)} flights were not begun, and count as none.")
     for lap in laps:
         if lap.kill is not None:
             lines.append(f"world {lap.seed}, {lap.kill} killed: {_ended(lap)}")

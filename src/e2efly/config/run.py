@@ -114,6 +114,8 @@ class Robust:
     """Units of the GRU, which remembers how the vehicle has answered."""
     hidden: tuple[int, ...] = (64, 64)
     """Units of the hidden layers."""
+    start_from: str | None = None
+    """The policy of the zoo whose weights the training starts from. None: fresh weights, or as the recipe says."""
 
     def into(self, config: "TrainConfig") -> "TrainConfig":
         """A configuration that learns in this way."""
@@ -125,6 +127,7 @@ class Robust:
             reward=config.reward
             if self.weights is None
             else RewardConfig(dict(self.weights), {**given, **self.parameters}),
+            start_from=self.start_from or config.start_from,
             steps=self.steps,
             chunk=self.chunk,
         )

@@ -135,6 +135,8 @@ class Lap:
     """The true motion, if it was recorded."""
     window: tuple[float, float] = (math.nan, math.nan)
     """Begin and end of the policy's flight, on this machine's monotonic clock, s."""
+    begun: bool = True
+    """Whether all processes were ready in their time. If not, nothing has flown: the flight does not count."""
 
     @property
     def good(self) -> bool:
@@ -146,7 +148,7 @@ class Lap:
         spreads = ("pose_to_image", "image_age", "to_stick", "pose_age", "lateness", "behind")
         return {
             **{name: getattr(self, name) for name in (
-                "seed", "kill", "success", "told", "nearest", "policy_s", "top_speed", "reaction",
+                "seed", "kill", "begun", "success", "told", "nearest", "policy_s", "top_speed", "reaction",
                 "touch_speed", "touch_sink",
             )},
             **{f"{name}_s": vars(getattr(self, name)) for name in spreads},

@@ -72,6 +72,10 @@ def _text(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
+class NotReadyError(RuntimeError):
+    """A program was not ready in its time. What it was started for has not begun."""
+
+
 class Program:
     """A program as a process, with its output.
 
@@ -136,6 +140,18 @@ class Program:
             raise RuntimeError(f"{self.name} did not come to {text!r}{self.end_told()}")
         return self.said[-1]
 
+    def ready(self, text: str, seconds: float = START_S) -> str:
+        """Wait until it prints a text, by which it is ready. Returns the line.
+
+        Raises:
+            NotReadyError: when it does not, with its time by the clock and by a processor, and its last lines.
+        """
+        try:
+            return self.wait_for(text, seconds)
+        except RuntimeError as error:
+            had = f"{seconds:g} s, in which it had a processor for {_computed(self.process.pid):.0f} s"
+            raise NotReadyError(f"{self.name} was not ready within {had}: {error}") from None
+
     def end_told(self) -> str:
         """How it has ended, if it has ended, and its last lines."""
         status = self.process.poll()
@@ -188,6 +204,15 @@ class Program:
         self._lines.put(None)
 
 
+def _computed(process: int) -> float:
+    """Processor time of a process of Linux, s. NaN: it is not known."""
+    try:
+        times = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[11:13]
+    except OSError:
+        return math.nan
+    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+
+
 class Room:
     """A room with a vehicle and its firmware, and a pilot for it. Use it as a context manager."""
 
@@ -201,14 +226,14 @@ class Room:
         given. Without a port, the poses go to a free one.
 
         Raises:
-            RuntimeError: when it does not start, with its last lines.
+            NotReadyError: when it does not start, with its last lines.
         """
         self.pose_port = free_port() if pose_port is None else pose_port
         """Port to which its poses go."""
         command = ["-m", "e2efly.validation.room_process", "--pose-port", str(self.pose_port)]
         self.program = Program("the room", [*command, "--vehicle", vehicle, "--seed", str(seed), *options], core)
         try:
-            told = json.loads(self.program.wait_for('"link"', START_S))
+            told = json.loads(self.program.ready('"link"'))
             self.link: str = told["link"]
             """Address of the firmware."""
             self._control = socket.create_connection(("127.0.0.1", told["control"]), timeout=30.0)
@@ -301,9 +326,9 @@ def take_off(room: Room, flies: Program) -> None:
     """Hand over control, arm, and hover. The pilot repeats steps that fail on a busy machine.
 
     Raises:
-        RuntimeError: when the bridge does not take off, with its last lines.
+        RuntimeError: when the bridge does not take off, with its last lines; `NotReadyError`, when it does not start.
     """
-    flies.wait_for("INIT", START_S)
+    flies.ready("INIT")
     room.set(override=True, throttle=0.0)
     end = time.monotonic() + START_S
     while True:

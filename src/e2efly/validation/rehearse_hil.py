@@ -29,6 +29,7 @@ from e2efly.validation.processes import (
     FLIGHT_S,
     START_S,
     TAKEN,
+    NotReadyError,
     Program,
     Room,
     Victim,
@@ -156,7 +157,8 @@ def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None =
     where the vehicle stands, and of the time of a kill.
 
     Returns:
-        The results of the flight. If a program fails, its last words are in the problems.
+        The results of the flight. If a program fails, its last words are in the problems. If one is not ready in its
+        time, the flight has not begun.
 
     Raises:
         ValueError: as for `draw`; or if the folder contains an earlier flight.
@@ -169,6 +171,8 @@ def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None =
     try:
         with ExitStack() as stack:
             _Flight(plan, drawn, seed, folder, heard, stack).fly(kill)
+    except NotReadyError as error:
+        return Lap(seed, kill, begun=False, told="not begun", problems=(str(error),))
     except (RuntimeError, OSError) as error:
         heard.problems.append(str(error))
     radius = float(plan.vehicle.radius)
@@ -210,7 +214,7 @@ class _Flight:
         to = ["--to", *map(str, ports), "--seed", str(seed), "--delay", f"{plan.pose_delay:.6g}"]
         self.mocap = Program("motion capture", ["-m", "e2efly.validation.mocap_process", *to])
         stack.enter_context(self.mocap)
-        inlet = json.loads(self.mocap.wait_for('"from"', START_S))["from"]
+        inlet = json.loads(self.mocap.ready('"from"'))["from"]
         node = ["--pose", f"udp:{ports[0]}", "--seed", str(seed), "--json", str(folder / "node.json")]
         node += ["--track", str(folder / "track.toml"), *images]
         node += ["--origin", *(f"{x:.9g}" for x in plan.origin.position), "--origin-yaw", f"{plan.origin.yaw:.9g}"]
@@ -221,7 +225,7 @@ class _Flight:
         world = [*plan.world, *([] if plan.scene is None else plan.scene.options)]
         self.node = Program("the HIL node", ["-m", "e2efly", "hil", policy, *node, *flies, *world], cores[-1])
         stack.enter_context(self.node)
-        self.node.wait_for("Fly it with", 2 * START_S)
+        self.node.ready("Fly it with", 2 * START_S)
         stands = ["--at", *(f"{x:.6g}" for x in self._stand()), "--exact", "--record", str(folder / "truth.csv")]
         self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
         stack.enter_context(self.room)
@@ -238,7 +242,7 @@ class _Flight:
         to = ["--to", self.room.link.rpartition(":")[2], "--delay", f"{self.plan.radio:.6g}"]
         self.radio = Program("the radio", ["-m", "e2efly.validation.link_process", *to])
         stack.enter_context(self.radio)
-        return json.loads(self.radio.wait_for('"link"', START_S))["link"]
+        return json.loads(self.radio.ready('"link"'))["link"]
 
     def _first(self) -> np.ndarray:
         return self.drawn.course.origin.points(self.drawn.course.start)

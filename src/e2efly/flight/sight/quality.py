@@ -31,11 +31,12 @@ BEYOND_M = 0.2
 """The distance that is added, m."""
 MOST = 0.7
 """Share of the lowest row that has to be too far away for an image to contradict the ground."""
-WRONG = 10
+WRONG = 5
 """After this many images in a row that contradict the ground, the camera is mounted differently, upside down for
 example."""
-MOUNTED = 0.06
-"""How far a camera may be off its mount, rad: as far as in the training of the preset `robust`."""
+MOUNTED, FIELD = 0.06, 0.04
+"""How far a camera may be off its mount, rad, and by which share its field of view may be smaller: as in the training
+of the preset `robust`."""
 STANDING = 0.2
 """Height of a camera over the ground below which the vehicle may stand on something, m."""
 LEVEL, TURNING = 0.35, 1.0
@@ -115,7 +116,7 @@ def see(
         shows, old, contradicts = _shows(seen.camera, frame.image), seen.frame, None
         same = shows and seen.camera.sees != "mask" and old is not None and np.array_equal(old.image, frame.image)
         if odometry is not None:
-            contradicts = _contradicts(seen.camera, frame.image, odometry, ground)
+            contradicts = _contradicts(seen.camera, frame.image, odometry, ground, now - frame.time)
         seen = dataclasses.replace(
             seen,
             frame=frame,
@@ -148,12 +149,14 @@ def _shows(camera: Image, image: np.ndarray) -> bool:
     return bool(np.any(image > DARK)) if camera.sees == "rgb" else bool(np.any(image != 0))
 
 
-def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float) -> bool | None:
-    """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is tilted up by
-    `MOUNTED` more than it should be. None: the image cannot tell.
+def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: float, age: float) -> bool | None:
+    """Whether the lowest row of a depth image is farther away than the ground there, also if the camera is off by
+    `MOUNTED` and `FIELD`, and if the vehicle has turned down in the `age` s since the exposure. None: the image cannot
+    tell.
     """
-    turning = float(np.linalg.norm(odometry.body_rate)) > TURNING
-    if camera.sees != "depth" or camera.projection != "pinhole" or turning or tilt_of(odometry.quaternion) > LEVEL:
+    turning = float(np.linalg.norm(odometry.body_rate))
+    usable = camera.sees == "depth" and camera.projection == "pinhole" and turning <= TURNING
+    if not usable or tilt_of(odometry.quaternion) > LEVEL:
         return None
     across, down = (math.tan(angle / 2) for angle in camera.fov_rad)
     left = across * (1 - 2 * (np.arange(camera.width) + 0.5) / camera.width)
@@ -165,7 +168,8 @@ def _contradicts(camera: Image, image: np.ndarray, odometry: Odometry, ground: f
     height = float(odometry.position[2]) + float(place.z) - ground
     if height < STANDING:
         return None
-    depth = height / np.maximum(-np.asarray(rays.z) - MOUNTED, 1e-6)
+    higher = MOUNTED - FIELD * low + turning * max(age, 0.0)
+    depth = height / np.maximum(-np.asarray(rays.z) - higher, 1e-6)
     told = (depth > camera.reach_m[0]) & (depth * BEYOND + BEYOND_M < camera.reach_m[1]) & (image[-1] > 0)
     if told.mean() < MOST:
         return None

@@ -161,3 +161,30 @@ class RaceClutterConfig(TaskConfig):
             task, settings, RewardConfig(weights, parameters), EnvConfig(cameras=cls.cameras), network,
             steps=steps, chunk=200, eval_episodes=500, curriculum=curriculum, fast_compile=False,
         )  # fmt: skip
+
+
+@register("race_clutter_room")
+@dataclass(frozen=True)
+class RaceClutterRoomConfig(RaceClutterConfig):
+    """Fly through gates in order, in a room of 6x6 m, among obstacles seen only by a camera."""
+
+    route: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterRoomRoute"
+    # gates are near everywhere: `fit` costs less, so that a low speed is obeyed
+    robust: ClassVar = {
+        "bptt": Robust(
+            weights={
+                "vel": 4.0, "near": 0.3, "avoid": 12.0, "fit": 6.0, "ori2": 0.3, "anglev_sq": 0.01, "act2_sq": 0.02,
+            },
+            algo={"learning_rate": 3e-3}, start_from="race_clutter",
+            steps=1_200_000, chunk=100, recurrent=96, hidden=(128, 64),
+        )
+    }  # fmt: skip
+    paper: ClassVar = None
+
+    episode_s: float = 15.0
+    track: tuple[str, ...] = shape(("room_6",))
+    scale: float = number(1.0, above=0)
+    clutter: ClutterConfig = ClutterConfig(sideways=1.5, size=(0.1, 0.3), clear=0.4)
+    gate_position: float = 0.1
+    gate_yaw: float = number(0.1, high=ANGLE)
+    speed: tuple[float, float] = number((1.5, 2.5), high=SPEED, rising=True)

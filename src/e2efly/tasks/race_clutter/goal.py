@@ -136,3 +136,15 @@ class RaceClutterRoute(Route):
             RaceClutterGoal(config, shape, control_period, 1), memory,
             np.asarray(track.start, np.float64), heading=float(track.start_yaw), points=track.corners, clearance=0.0,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RaceClutterRoomRoute(RaceClutterRoute):
+    """The track in the room to race on, and the speed."""
+
+    track: str = "room_6"
+    """room_6, or the path of a .toml file."""
+    scale: float = number(1.0, above=0)
+    """Factor by which the ground plan of the track is enlarged."""
+    speed: float = number(2.0, above=0, high=SPEED)
+    """Commanded speed, m/s."""
