@@ -32,7 +32,7 @@ from e2efly.simulation.device import prepare
 from e2efly.tasks.race_speed.goal import QUICKEST
 from e2efly.validation.evaluation import Candidate, act_of, candidate
 
-BATCH = 500
+BATCH = 250
 """Starts that are flown at once."""
 LAPS = 2
 """Laps of a closed track."""
@@ -119,10 +119,10 @@ def main() -> None:
     """Fly, print a table, write the figures."""
     every = [f"{vehicle}/race_speed" for vehicle, tasks in contents().items() if "race_speed" in tasks]
     options = arguments(
-        __doc__ or "", policies=every, tracks=[*ROOMS, "four_gates"], speeds=[2.0, 3.0, 5.0, 8.0, 12.0], starts=1000
+        __doc__ or "", policies=every, tracks=[*ROOMS, "four_gates"], speeds=[2.0, 3.0, 5.0, 8.0, 12.0], starts=500
     )
     prepare("cpu")
-    rows = []
+    rows, whole = [], []
     for policy in options.policies:
         found = candidate(policy, task={"track": TRACKS})
         (suite,) = found.task.criteria().values()
@@ -132,9 +132,9 @@ def main() -> None:
             for speed in flown_at(name, options.speeds):
                 rows.append({"policy": policy, **measured(found, *envs, name, speed, options.starts)})
                 print(rows[-1], flush=True)
-    keys = "policy", "track", "commanded, m/s"
-    whole = sorted(with_earlier("race_speed", options.json, "table", keys, rows), key=lambda row: row["policy"])
-    write("race_speed", options.json, {"table": whole})
+        earlier = with_earlier("race_speed", options.json, "table", ("policy", "track", "commanded, m/s"), rows)
+        whole = sorted(earlier, key=lambda row: row["policy"])
+        write("race_speed", options.json, {"table": whole})
     print(table(whole))
 
 
