@@ -125,8 +125,10 @@ Plain: `cc -O2`. Native: `cc -O3 -march=native`. Difference: the largest differe
 value of the policy.onnx in double precision, on 200 random inputs; for ONNX Runtime likewise.
 [What is exported](onboard.md#as-c).""",
     "race_speed": """
-Two laps, one of an open track. Speeds are along the way from the first gate on: the mean of the races that succeed, and
-the highest of all. The distance to the wall is the smallest of any race's path, of the centre of mass.
+Two laps, one of an open track, with the vehicle of the file in still air; of *any quadrotor*, with random vehicles in
+still air. Random vehicles are those of the policy's training, in its winds and gusts. Speeds are along the way from the
+first gate on: the mean of the races that succeed, and the highest of all. The distance to the wall is the smallest of
+any race's path, of the centre of mass. The starts have a seed by which no recipe and no policy was chosen (6000000).
 [What is flown](tasks.md#at-a-commanded-speed).""",
     "onboard": """
 Each flies hover with a controller that gives the answers of recorded firmware. [How to install

@@ -80,7 +80,7 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     robust = [(vehicle, task) for vehicle, task in POLICIES if "stress" in contents()[vehicle][task]]
     assert {task for _, task in robust} == {
         "avoid", "gap", "hover", "hover_aware", "land", "land_visual", "race", "race_clutter",
-        "race_clutter_room", "track",
+        "race_clutter_room", "race_speed", "track",
     }  # fmt: skip
     for vehicle, task in robust:
         stated = contents()[vehicle][task]["stress"]
@@ -97,6 +97,8 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
     assert set(contents()[USUAL]) == {*TASKS, "race_any"}
     assert set(contents()) == {*vehicle_names(), *family_names()}
+    for task in ("hover", "land", "track", "race", "race_speed"):  # by poses alone: every vehicle has them
+        assert all(task in tasks for tasks in contents().values())
     assert {file.stem for file in FOLDER.glob("*/*.onnx")} == {*TASKS, "race_any"}
     assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
 

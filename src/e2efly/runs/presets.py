@@ -29,6 +29,7 @@ from e2efly.tasks import TASKS
 from e2efly.vehicles import posterior
 from e2efly.vehicles.family import load_family
 from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle import Vehicle
 
 ROBUST, IDENTIFIED, NOMINAL = "robust", "identified", "nominal"
 PAPER, AUTHORS = NAMES
@@ -204,7 +205,8 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
     """A configuration for another vehicle or a family, given by name or .toml file.
 
     If the weakest vehicle of the preset `robust` could not hover, the ranges of mass and thrust are all reduced by the
-    same factor. For a family the preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
+    same factor. The centre of mass is drawn no farther off than the rate loop can hold (`_held`). For a family the
+    preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
 
     Raises:
         ValueError: for a vehicle that does not exist.
@@ -221,11 +223,24 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
         env = dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle, cameras=env.cameras)
         return given.into(dataclasses.replace(config, env=env))
     if robust:
-        margin = load_vehicle(vehicle).thrust_to_weight
+        known = load_vehicle(vehicle)
         shares = (_narrower(percent / 100) for percent in range(100, -1, -1))
-        drawn = next(drawn for drawn in shares if margin * drawn.weakest >= 1)
-        env = dataclasses.replace(env, randomize=drawn.randomize, disturbance=drawn.disturbance)
+        drawn = next(drawn for drawn in shares if known.thrust_to_weight * drawn.weakest >= 1)
+        off = min(drawn.disturbance.centre_of_mass, _held(known, drawn.randomize["rate_gain"]))
+        disturbance = dataclasses.replace(drawn.disturbance, centre_of_mass=off)
+        env = dataclasses.replace(env, randomize=drawn.randomize, disturbance=disturbance)
     return dataclasses.replace(config, env=env)
+
+
+def _held(vehicle: Vehicle, spread: float) -> float:
+    """The largest offset of the centre of mass that the rate loop can hold, m, along the worse of the two axes.
+
+    An offset c turns the body by the torque T c, where T is the thrust. A rate loop without an integral part then turns
+    faster than commanded by T c / (J K), where J is the inertia and K the gain. At full thrust, and with the smallest
+    gain that is drawn, this must not exceed the largest rate that the policy can command against it.
+    """
+    most = (1 - spread) * vehicle.inertia * vehicle.rate_gain * vehicle.body_rate_max / (4 * vehicle.thrust_range[1])
+    return float(most[:2].min())
 
 
 def _narrower(share: float) -> EnvConfig:

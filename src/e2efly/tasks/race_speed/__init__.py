@@ -33,7 +33,16 @@ class RaceSpeedConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedRoute"
     best: ClassVar = "bptt"
     robust: ClassVar = {"bptt": Robust(steps=5_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
-    family: ClassVar = {"bptt": Robust(steps=6_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
+    family: ClassVar = {
+        "bptt": Robust(
+            weights={"vel": 1.0, "progway": 2.5, "fitlog": 40.0, "anglev_sq": 0.001, "act2_sq": 0.01},
+            algo={"learning_rate": 4e-3, "learning_rate_end": 1e-4, "gradient_decay": 0.3},
+            steps=14_000_000,
+            chunk=100,
+            recurrent=96,
+            hidden=(96, 96),
+        )
+    }
 
     episode_s: float = 30.0
     """Length of an episode, s."""
