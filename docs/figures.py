@@ -217,7 +217,8 @@ flights succeed. The others fly what `e2efly fly` flies without further options.
 The zoo's policies of VIS-R, as they ship, in all nine tasks. Success is the task's own verdict,
 by the code that judges training. All policies are by the preset `robust`. What the last three see is
 rendered at the body's true pose, in another world each time. A flight that touches a solid does not
-succeed.""",
+succeed. The race is half a metre higher than its track. The fence's guard ended the third
+flight of race_clutter near the ground.""",
     "filter": """
 VIS-R on the simulator's body. Each flight has a fence of its own with a largest speed of its own, 3 to 10
 m/s. There are 90 ms of delay, noise of motion capture, gusts of up to 3 m/s, and a fifth less thrust, of
