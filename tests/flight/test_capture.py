@@ -46,7 +46,7 @@ def memories() -> list[Path]:
 
 
 def test_a_video_is_read_in_its_colours_at_its_rate_and_ends_like_an_unplugged_camera(tmp_path: Path) -> None:
-    source = open_image(write_video(tmp_path / "video.mp4", 1.0), COLOURS)
+    source = open_image(write_video(tmp_path / "video.mp4", 3.0), COLOURS)
     assert isinstance(source, Captured)
     assert source.describe().endswith(f"video.mp4, 96 rows, 128 columns (OpenCV {cv2.__version__})")
     frames: list[Frame] = []
@@ -60,7 +60,7 @@ def test_a_video_is_read_in_its_colours_at_its_rate_and_ends_like_an_unplugged_c
         assert frame.image[:, 18:].min() > 0.9
     times = np.array([frame.time for frame in frames])
     np.testing.assert_allclose(np.diff(times) * RATE, np.round(np.diff(times) * RATE), atol=1e-3)
-    assert times[-1] - times[0] < 1.0
+    assert times[-1] - times[0] < 3.0
     seen = see(seen, frames[-1:], frames[-1].time, trouble=source.problem)
     said = seen.problem(frames[-1].time + 1.0)
     assert said.startswith("image 'image_0': is 1000 ms old; accepted: at most")
