@@ -150,9 +150,8 @@ def test_datagrams_come_in_order_and_bad_ones_are_counted(udp: tuple) -> None:
 def test_a_datagram_is_dated_by_its_arrival_not_by_its_reading(udp: tuple) -> None:
     source, send = udp
 
-    def is_dated() -> (
-        bool
-    ):  # a kernel begins to do so in its own time after it is asked, and until then dates a reading
+    def is_dated() -> bool:
+        """A kernel begins in its own time after it is asked. Until then it dates the reading."""
         send(encode())
         time.sleep(0.02)
         return time.monotonic() - gather(source, 1)[0].received > 0.015
