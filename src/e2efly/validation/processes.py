@@ -274,10 +274,8 @@ class Room:
         return False
 
     def down(self, seconds: float) -> bool:
-        """Whether the vehicle comes to stand, with its throttle closed, within `seconds`. A motor then idles. The rate
-        loop's integral may hold others higher, until the pilot disarms.
-        """
-        return self.until(seconds, lambda state: state["standing"] and min(state["motors"]) < 0.12)
+        """Whether the vehicle comes to stand, with its throttle closed, within `seconds`."""
+        return self.until(seconds, lambda state: state["standing"] and max(state["motors"]) < 0.12)
 
     def land_by_hand(self, seconds: float) -> bool:
         """Take over the vehicle and land it like a pilot who sees it. Returns whether it stands within `seconds`."""

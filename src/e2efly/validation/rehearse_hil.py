@@ -17,7 +17,6 @@ import numpy as np
 
 from e2efly.courses.origin import Origin
 from e2efly.flight.pilot.fence import check_course
-from e2efly.flight.pilot.flight_state import Reason
 from e2efly.flight.settings import Fence
 from e2efly.flight.sight.shared import place
 from e2efly.policy.goal import Course
@@ -64,8 +63,6 @@ DOCUMENTED: dict[Victim, tuple[str, str]] = {
 }
 """The bridge's next mode after a kill (empty: any), and the beginning of its reason. A bridge that was killed gives
 none."""
-BY_FENCE = (str(Reason.GUARD), str(Reason.OUTSIDE_FENCE))
-"""Beginnings of the reasons of the fence."""
 
 
 @dataclass(frozen=True)
@@ -184,9 +181,7 @@ def rehearse(plan: RehearsalPlan, seed: int, folder: Path, kill: Victim | None =
 
 
 def unlike(lap: Lap) -> list[str]:
-    """Everything in a flight's records that is not as documented. In a small room the fence may act before the bridge
-    knows of the kill.
-    """
+    """Everything in a flight's records that is not as documented."""
     found = []
     if lap.touch_sink > TOUCH:
         found.append(f"touched the ground sinking at {lap.touch_sink:.1f} m/s")
@@ -196,9 +191,8 @@ def unlike(lap: Lap) -> list[str]:
     after = [change for change in lap.changes if change.time > lap.window[0]]
     if not after:
         return [*found, f"after the kill the bridge changed no mode; documented: {wanted or 'any'}, {reason}"]
-    own = next((c for c in after if not all(text.startswith(BY_FENCE) for text in c.reasons)), after[0])
-    if wanted not in ("", own.mode) or not any(text.startswith(reason) for text in own.reasons):
-        said = f"{own.mode} ({'; '.join(own.reasons)})"
+    if wanted not in ("", after[0].mode) or not any(text.startswith(reason) for text in after[0].reasons):
+        said = f"{after[0].mode} ({'; '.join(after[0].reasons)})"
         found.append(f"after the kill came {said}; documented: {wanted or 'any mode'} ({reason})")
     return found
 
