@@ -4,6 +4,7 @@ import dataclasses
 import math
 import zlib
 from pathlib import Path
+from statistics import NormalDist
 
 import jax
 import jax.numpy as jnp
@@ -46,6 +47,19 @@ def test_gaussian_and_speckle() -> None:
     assert np.all(speckle(KEY, jnp.zeros((1, 9, 9)), 0.5) == 0)
     for image in (gaussian(KEY, GREY, 3.0), speckle(KEY, GREY, 3.0)):
         assert image.min() == 0 and image.max() == 1
+
+
+def test_noise_is_normal_and_independent_between_pixels_images_and_keys() -> None:
+    grey = jnp.full((50, 64, 64), 0.5)
+    drawn = np.concatenate([(gaussian(random_key(seed), grey, 0.05) - 0.5) / 0.05 for seed in (0, 1)])
+    ranked = np.sort(drawn.ravel())
+    expected = np.vectorize(NormalDist().cdf)(ranked[::100])
+    assert np.abs(np.linspace(0, 1, ranked.size)[::100] - expected).max() < 1.63 / math.sqrt(ranked.size)  # 1 %
+    assert (np.abs(drawn) > 4).mean() == pytest.approx(2 * NormalDist().cdf(-4), rel=0.5)
+    others = (np.roll(drawn, 1, axis) for axis in (0, 1, 2))
+    apart = (drawn[50:], np.roll(drawn, 50, 0)[50:])
+    for a, b in (*((drawn, other) for other in others), apart, (np.abs(apart[0]), np.abs(apart[1]))):
+        assert abs(np.corrcoef(a.ravel(), b.ravel())[0, 1]) < 4 / math.sqrt(a.size)
 
 
 def test_salt_and_pepper() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray, UInt
 
 from e2efly.config import CameraConfig, ImageNoiseConfig
 from e2efly.config.registry import load
@@ -120,8 +120,28 @@ def _check_own(reference: str, camera: CameraConfig) -> None:
         raise ValueError(f"camera.noise.own is {reference}, which returns {out}; accepted: an image of {image.shape}")
 
 
+def _hashed(x: UInt[Array, "*n"]) -> UInt[Array, "*n"]:
+    """A hash of words: one step of PCG and its output (Jarzynski and Olano 2020, JCGT 9(3))."""
+    x = x * jnp.uint32(747796405) + jnp.uint32(2891336453)
+    x = ((x >> ((x >> 28) + 4)) ^ x) * jnp.uint32(277803737)
+    return (x >> 22) ^ x
+
+
+def _uniform(key: PRNGKeyArray, image: Array) -> Array:
+    """Random numbers of an image's shape, in (0, 1).
+
+    The key's generator draws one word for each image, and this word is hashed with the number of the pixel. On a CPU
+    XLA's generator would take more time for the pixels than the image takes.
+    """
+    n, *size = image.shape
+    words = jax.random.bits(key, (n, *(1 for _ in size)))
+    bits = _hashed(words + _hashed(jnp.arange(math.prod(size), dtype=jnp.uint32)).reshape(1, *size))
+    return ((bits >> 9).astype(image.dtype) + 0.5) * 2.0**-23
+
+
 def _normal(key: PRNGKeyArray, image: Array) -> Array:
-    return jax.random.normal(key, image.shape, image.dtype)
+    """Standard normal numbers of an image's shape, of at most 5.3."""
+    return math.sqrt(2) * jax.lax.erf_inv(2 * _uniform(key, image) - 1)
 
 
 def gaussian(key: PRNGKeyArray, image: Image, deviation: Strength, mean: Strength = 0.0) -> Image:
@@ -136,7 +156,7 @@ def speckle(key: PRNGKeyArray, image: Image, deviation: Strength, mean: Strength
 
 def salt_and_pepper(key: PRNGKeyArray, image: Image, amount: Strength, salt: Strength = 0.5) -> Image:
     """Replace a share `amount` of the pixels. A share `salt` of these becomes 1, and the others become 0."""
-    u = jax.random.uniform(key, image.shape, image.dtype)
+    u = _uniform(key, image)
     return jnp.where(u < amount * salt, 1.0, jnp.where(u < amount, 0.0, image))
 
 
@@ -222,8 +242,8 @@ def redwood(key: PRNGKeyArray, depth: Depth, table: Float[Array | np.ndarray, "8
     hole. Depth is divided by the distortion (`synthetic_distortion`). After noise, the disparity is rounded to eighths.
     """
     n, height, width = depth.shape
-    jitter_key, noise_key = jax.random.split(key)
-    jitter = jax.random.normal(jitter_key, (2, *depth.shape), depth.dtype) * 0.25 * depth
+    *jitter_keys, noise_key = jax.random.split(key, 3)
+    jitter = [0.25 * _normal(jitter_key, depth) * depth for jitter_key in jitter_keys]
     columns, rows = (
         jnp.arange(k, dtype=depth.dtype) * full / k for k, full in zip((width, height), REDWOOD_SIZE, strict=True)
     )
