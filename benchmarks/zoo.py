@@ -147,7 +147,10 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
         named = (
             f"{whose}/{name}" for whose, has in contents().items() for name in has if has[name]["sha256"] == digest
         )
-        config = dataclasses.replace(config, start_from=next(named))
+        start = next(named, None)
+        if start is None:
+            raise SystemExit(f"{policy} started from {config.start_from}; accepted: a policy of the zoo, as it is now")
+        config = dataclasses.replace(config, start_from=start)
     write_json(config_file(kept), to_json(config), indent=None)
     curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
