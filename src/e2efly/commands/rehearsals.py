@@ -4,7 +4,6 @@ import dataclasses
 import math
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
@@ -73,9 +72,3 @@ def _modes(number: int, flight: Rehearsal) -> RenderableType:
     for mode, reason in zip(flight.modes, flight.reasons, strict=True):
         table.add_row(mode, Text(reason))
     return Group(Text(f"\nflight {number} was not complete; its modes, and why each began:"), table)
-
-
-def flight_row(flight: Rehearsal) -> dict[str, Any]:
-    """A flight as JSON, without its track. Missing values are null."""
-    row = {f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"}
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

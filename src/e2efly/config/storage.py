@@ -22,9 +22,6 @@ import numpy as np
 LOCK = ".lock"
 """Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
 
-_UNREADABLE = (OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
-"""What the standard library raises for archives that are damaged or of another kind."""
-
 
 def cache_folder() -> Path:
     """The user's cache folder of this package."""

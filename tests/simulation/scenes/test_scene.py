@@ -161,7 +161,7 @@ class TestFile:
         file = tmp_path / "scene.toml"
         file.write_text(GOOD)
         scene = load_scene(file, 3)
-        assert scene.worlds == 3 and scene.capacity == 3 and scene.kinds == ("cylinder", "pad")
+        assert scene.worlds == 3 and scene.kinds == ("cylinder", "pad")
         columns = scene.solids["cylinder"]
         np.testing.assert_allclose(scene.ground, 0.5)
         np.testing.assert_allclose(columns.size[2, :, :2], [[0.2, 1.0], [0.3, 1.0]])
@@ -173,7 +173,7 @@ class TestFile:
     def test_an_empty_file_is_level_ground(self, tmp_path: Path) -> None:
         (tmp_path / "scene.toml").write_text("")
         scene = load_scene(tmp_path / "scene.toml")
-        assert scene.capacity == 0 and float(scene.ground[0]) == 0.0
+        assert not scene.solids and float(scene.ground[0]) == 0.0
         (tmp_path / "scene.toml").write_text("ground = false")
         assert float(load_scene(tmp_path / "scene.toml").ground[0]) == -FAR
 

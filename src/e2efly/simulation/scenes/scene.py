@@ -132,11 +132,6 @@ class Scene:
         """Number of worlds."""
         return self.ground.shape[0]
 
-    @property
-    def capacity(self) -> int:
-        """Number of solids for which a world has space."""
-        return sum(s.count for s in self.solids.values())
-
     def at(self, time: Float[Array, " n"]) -> "Scene":
         """The worlds at `time`, s, standing still."""
 
