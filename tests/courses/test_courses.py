@@ -74,15 +74,6 @@ def test_an_origin_turns_then_moves() -> None:
     np.testing.assert_allclose(origin.vectors(np.array([[1.0, 0.0, 0.0]])), [[0.0, 1.0, 0.0]], atol=1e-12)
 
 
-@pytest.mark.parametrize("curve", CURVES)
-def test_a_placed_spline_is_the_placed_path(curve: Lissajous) -> None:
-    origin, time = Origin((1.0, -2.0, 0.5), 0.7), np.linspace(0, 11, 100)[None]
-    spline = curve.spline((0.0, 0.0, 3.0), np.zeros(1), 23)
-    placed = origin.spline(spline)
-    np.testing.assert_allclose(placed.position(time), origin.points(spline.position(time)), atol=1e-12)
-    assert not np.allclose(placed.position(time), spline.position(time))
-
-
 @pytest.mark.parametrize("name", track_names())
 def test_a_placed_track_is_flown_by_the_placed_flight(name: str) -> None:
     origin, track, rng = Origin((3.0, -1.0, 0.2), -2.0), load_track(name), np.random.default_rng(1)

@@ -129,6 +129,18 @@ def finite(value: Any) -> Any:
     return value
 
 
+def make_folder(folder: Path, what: str = "--out") -> None:
+    """Make a folder and those above it, if it does not exist.
+
+    Raises:
+        OSError: when the folder cannot be made. `what` names it in the error text.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make {what} {folder}: {error.strerror}") from error
+
+
 @contextmanager
 def held(folder: Path, option: str = "--out") -> Iterator[None]:
     """Keep other processes from writing to a folder. The folder is made if it does not exist.
@@ -145,10 +157,7 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         OSError: when the folder cannot be made, or its file system has no locks.
     """
     anew = not folder.exists()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make {option} {folder}: {error.strerror}") from error
+    make_folder(folder, option)
     path = folder / LOCK
     try:
         file = _locked(path)

@@ -51,18 +51,6 @@ class FlownSession:
         """The steps in a mode."""
         return np.flatnonzero(np.array(self.mode) == mode)
 
-    def errors(self, mode: str, settle: float = 0.0, last: float | None = None) -> np.ndarray:
-        """Distance to the goal in a mode, m, without its first `settle` s, or only over its `last` s."""
-        steps = self.where(mode)
-        if not len(steps):
-            return np.array([])
-        t = np.array(self.time)[steps]
-        begin = t[0] + settle if last is None else t[-1] - last
-        return np.array([
-            np.linalg.norm(self.position[i] - goal)
-            for i, at in zip(steps, t, strict=True) if at >= begin and (goal := self.goal[i]) is not None
-        ])  # fmt: skip
-
 
 class Session:
     """A bridge on a started rig."""

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from e2efly.config.drawing import INK, Face, Line, Thing
+from e2efly.config.storage import make_folder
 from e2efly.control import COMMAND_MODES
 from e2efly.policy.runtime import Acting
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
@@ -142,10 +143,7 @@ def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) 
     Raises:
         OSError: when the folder cannot be created.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+    make_folder(folder, "the folder of the plots")
     plant, vehicle = found.plant.name, found.candidate.policy.contract.vehicle
     for name, suite in found.candidate.task.criteria().items():
         flown = dict(zip(("training simulator", plant), pairs[name].flown.values(), strict=True))
