@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
 
-from e2efly.config.drawing import INK, Face, Line, Thing
+from e2efly.config.drawing import Thing
 from e2efly.config.storage import make_folder
 from e2efly.control import COMMAND_MODES
 from e2efly.policy.runtime import Acting
@@ -21,7 +20,8 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import PLACES, Pair
 from e2efly.viewing.objects import scene
-from e2efly.viewing.style import BLUE, GREY, VERMILLION, figure
+from e2efly.viewing.space import draw_flat
+from e2efly.viewing.style import BLUE, FAILURE, GREY, VERMILLION, figure
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linewidth": 2.8, "alpha": 0.5},
@@ -30,7 +30,6 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 """Line styles: the first place is wide and pale, the second thin and on top. Where they agree, both are visible."""
 DRAWN = 6
 """Number of starts that are drawn for each criterion."""
-_FAILED: dict[str, Any] = {"marker": "X", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
 
 
 def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, title: str) -> None:
@@ -79,29 +78,19 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
         for ax in panels[4:]:
             ax.set_xlabel("time (s)")
         handles = [Line2D([], [], label=name, **look) for (name, _), look in places]
-        handles.append(Line2D([], [], color=GREY, label="no success", **_FAILED))
+        handles.append(Line2D([], [], label="no success", **FAILURE | {"markerfacecolor": GREY}))
         fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
 def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -> None:
     """Draw all flights projected onto two of the world's axes, over the objects of the task."""
-    columns = list(axes)
-    for thing in things:
-        if isinstance(thing, Line):
-            ax.plot(*thing.points[:, columns].T, color=thing.color, linewidth=thing.width, zorder=1.5)
-        elif isinstance(thing, Face):
-            ax.add_patch(Polygon(thing.points[:, columns], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
-        elif thing.text:
-            x, y = thing.point[columns]
-            ax.text(x, y, thing.text, color=INK, ha="center", va="center", weight="bold")
-        else:
-            ax.plot(*thing.point[columns, None], marker=thing.marker, color=INK, markersize=11, linestyle="")
+    draw_flat(ax, things, axes)
     for (_, flights), look in places:
         for i, length in enumerate(flights.length):
-            track = flights.position[:length, i][:, columns]
+            track = flights.position[:length, i][:, axes]
             ax.plot(*track.T, **look)
             if length and not flights.success[i]:
-                ax.plot(*track[-1, :, None], color=look["color"], zorder=7, **_FAILED)
+                ax.plot(*track[-1, :, None], zorder=7, **FAILURE | {"markerfacecolor": look["color"]})
     ax.set_aspect("equal", adjustable="datalim")
 
 
