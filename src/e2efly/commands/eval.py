@@ -13,7 +13,7 @@ from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.policies import Asked, named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
-from e2efly.commands.terminal import Terminal, seconds
+from e2efly.commands.terminal import Terminal, headed, seconds
 from e2efly.config import EnvConfig, TaskConfig
 from e2efly.config.run import TIMED
 from e2efly.config.storage import write_json
@@ -141,9 +141,7 @@ def _table(evaluated: "Evaluation", episodes: int) -> Table:
 
     found = {name: summary(e) for name, e in evaluated.flown.items()}
     errs = evaluated.candidate.task.precision not in TIMED  # the distance from the goal is meaningful
-    table = Table(
-        f"of {episodes} starts, {evaluated.candidate.vehicles}", *found, box=None, header_style="bold", pad_edge=False
-    )
+    table = headed(f"of {episodes} starts, {evaluated.candidate.vehicles}", *found)
 
     def row(heading: str, show: Callable[[dict[str, Any]], str]) -> None:
         table.add_row(heading, *(show(s) for s in found.values()))
