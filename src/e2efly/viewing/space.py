@@ -179,7 +179,8 @@ def draw_flat(ax: Axes, things: list[Thing], axes: tuple[int, int]) -> None:
         elif isinstance(thing, Face):
             ax.add_patch(Polygon(thing.points[:, columns], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
         elif thing.text:
-            ax.text(*thing.point[columns], thing.text, **_TEXT)
+            x, y = thing.point[columns]
+            ax.text(x, y, thing.text, **_TEXT)
         else:
             ax.plot(*thing.point[columns, None], marker=thing.marker, **MARK, zorder=5)
 

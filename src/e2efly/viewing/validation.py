@@ -21,7 +21,7 @@ from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import PLACES, Pair
 from e2efly.viewing.objects import scene
 from e2efly.viewing.space import draw_flat
-from e2efly.viewing.style import BLUE, FAILURE, GREY, VERMILLION, figure
+from e2efly.viewing.style import BLUE, GREY, VERMILLION, figure
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linewidth": 2.8, "alpha": 0.5},
@@ -30,6 +30,7 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 """Line styles: the first place is wide and pale, the second thin and on top. Where they agree, both are visible."""
 DRAWN = 6
 """Number of starts that are drawn for each criterion."""
+_FAILED: dict[str, Any] = {"marker": "X", "markersize": 8, "markeredgecolor": "white", "linestyle": ""}
 
 
 def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, title: str) -> None:
@@ -78,7 +79,7 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
         for ax in panels[4:]:
             ax.set_xlabel("time (s)")
         handles = [Line2D([], [], label=name, **look) for (name, _), look in places]
-        handles.append(Line2D([], [], label="no success", **FAILURE | {"markerfacecolor": GREY}))
+        handles.append(Line2D([], [], color=GREY, label="no success", **_FAILED))
         fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
@@ -90,7 +91,7 @@ def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -
             track = flights.position[:length, i][:, axes]
             ax.plot(*track.T, **look)
             if length and not flights.success[i]:
-                ax.plot(*track[-1, :, None], zorder=7, **FAILURE | {"markerfacecolor": look["color"]})
+                ax.plot(*track[-1, :, None], color=look["color"], zorder=7, **_FAILED)
     ax.set_aspect("equal", adjustable="datalim")
 
 
