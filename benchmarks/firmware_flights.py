@@ -13,6 +13,7 @@ vehicle leaves it. The fastest race is that of the highest speed of `SPEEDS` at 
 
 import dataclasses
 import json
+import math
 import time
 from argparse import Namespace
 from typing import Any
@@ -21,7 +22,7 @@ import numpy as np
 from common import RESULTS, arguments, table, with_earlier, write
 from rich.console import Console
 
-from e2efly.commands.rehearsals import flight_row, fly_whole
+from e2efly.commands.rehearsals import fly_whole
 from e2efly.flight.settings import Fence
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import route_of
@@ -49,6 +50,12 @@ IN_ROOM: dict[str, tuple[str, dict[str, Any]]] = {
     "race_clutter": ("race_clutter_room", {}),
 }
 """Policy and goal of each row."""
+
+
+def flight_row(flight: Rehearsal) -> dict[str, Any]:
+    """A flight as JSON, without its track. Missing values are null."""
+    row = {f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"}
+    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
 
 
 def main() -> None:

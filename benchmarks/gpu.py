@@ -47,13 +47,15 @@ def card(short: bool, device: str) -> Iterator[Row]:
 
 def physics(short: bool, device: str) -> Iterator[Row]:
     """Sub-steps of the default integrator."""
+    from variants import own_parameters
+
     from e2efly.learning.benchmark import physics_substeps
 
     sizes = (64, 256) if short else (1024, 65_536, 1_048_576)
     for n in sizes:
         yield f"physics sub-steps, {n:,} vehicles", physics_substeps(n), "/s"
     what = f"physics sub-steps, {sizes[-1]:,} vehicles, each with its own parameters"
-    yield what, physics_substeps(sizes[-1], general=True), "/s"
+    yield what, physics_substeps(sizes[-1], own_parameters(sizes[-1])), "/s"
 
 
 def environment(short: bool, device: str) -> Iterator[Row]:
@@ -71,9 +73,9 @@ def training(short: bool, device: str) -> Iterator[Row]:
 
     for sized in dict.fromkeys((device, "cpu")):
         for algo in ("ppo", "bptt"):
-            envs = presets.starting("hover", algo, presets.NOMINAL, device=sized).algo.envs
-            what = f"{algo.upper()} training steps, hover, {envs:,} environments"
-            yield what, training_steps("hover", algo, device=sized), "/s"
+            config = presets.starting("hover", algo, presets.NOMINAL, device=sized)
+            what = f"{algo.upper()} training steps, hover, {config.algo.envs:,} environments"
+            yield what, training_steps(config), "/s"
 
 
 def images(short: bool, device: str) -> Iterator[Row]:

@@ -26,7 +26,7 @@ from common import arguments, table, write
 from tests.validation.firmware_excitation import fly_excited
 
 from e2efly.alignment.checks import checked
-from e2efly.alignment.identification import Found, identify
+from e2efly.alignment.identification import Found, identify, whole_covariance
 from e2efly.flight.settings import Fence
 from e2efly.logs.blackbox_merge import setpoint_delay, with_blackboxes
 from e2efly.logs.readers import read_flights
@@ -132,9 +132,29 @@ def errors(body: Vehicle, found: Found, by_firmware: bool = False) -> Errors:
                 axis = f" {'xyz'[i]}" if truth.size == 3 and name != "thrust_map" else ""
                 told(label + axis, float((value[i] - truth[i]) / scale), float(sigma[i] / abs(scale)))
     truth = body.drag_linear * AIR + body.drag_quadratic * AIR**2
-    for axis, value, sigma, true in zip("xyz", *found.drag_at(AIR), truth, strict=True):
+    for axis, value, sigma, true in zip("xyz", *drag_at(found, AIR), truth, strict=True):
         told(f"drag at {AIR:g} m/s, {axis}", float(value / true - 1), float(sigma / true))
     return out
+
+
+def drag_at(found: Found, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
+
+    A flight determines the drag at its own speeds better than the division into a linear and a quadratic part.
+    """
+    covariance = whole_covariance(found.fit, found.sigma)
+    value, sigma = np.zeros(3), np.zeros(3)
+    for axis in range(3):
+        slope = np.zeros(len(found.p))
+        for power, name in ((1, "drag_linear"), (2, "drag_quadratic")):
+            part = float(getattr(found.model.base, name)[axis]) * speed**power
+            for i, unknown in enumerate(found.model.unknowns):
+                if unknown.field == name and axis in unknown.entries:
+                    part *= float(np.exp(found.p[i]))
+                    slope[i] = part
+            value[axis] += part
+        sigma[axis] = np.sqrt(slope @ covariance @ slope)
+    return value, sigma
 
 
 def main() -> None:

@@ -13,9 +13,11 @@ from typing import Any
 
 from common import arguments, measured, median, training
 from peers import PEERS, physics_steps
+from variants import own, own_parameters, wide
 
 from e2efly.config import EnvConfig
 from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
+from e2efly.runs import presets
 from e2efly.simulation.device import prepare
 
 WORLDS = 1024
@@ -37,14 +39,15 @@ def quantities() -> dict[str, tuple[dict[str, str], Callable[[], float]]]:
         f"{name}: physics steps": ({}, partial(physics_steps, name, WORLDS)) for name in PEERS
     }
     found[PHYSICS] = third, partial(physics_substeps, WORLDS)
-    found[PHYSICS + OWN] = third, partial(physics_substeps, WORLDS, general=True)
+    found[PHYSICS + OWN] = third, partial(physics_substeps, WORLDS, own_parameters(WORLDS))
     found[ENVIRONMENT] = third, partial(environment_steps, "hover", WORLDS)
     for algo in ("ppo", "bptt"):
         about = training(f"train hover --algo {algo} --preset nominal")
-        found[what(algo)] = about, partial(training_steps, "hover", algo)
-        found[what(algo) + OWN] = about, partial(training_steps, "hover", algo, general=True)
+        config = presets.starting("hover", algo, presets.NOMINAL)
+        found[what(algo)] = about, partial(training_steps, config)
+        found[what(algo) + OWN] = about, partial(training_steps, own(config))
         if algo == "bptt":
-            found[what(algo) + WIDE] = about, partial(training_steps, "hover", algo, wide=True)
+            found[what(algo) + WIDE] = about, partial(training_steps, wide(config))
     return found
 
 

@@ -253,13 +253,13 @@ each mode and rule, and the eight flights: [faults](faults.md#faults-by-chance-t
 def noise() -> None:
     """The pictures of docs/noise.md: a corridor seen by a D435i, and an IMU at rest."""
     import numpy as np
+    from noise_plots import plot_depth_noise, plot_image_noise, plot_imu
     from PIL import Image
 
     from e2efly.config import ImuConfig
     from e2efly.environment import random_key
     from e2efly.simulation.scenes.camera import PRESETS
     from e2efly.viewing.image_plots import look_around, sized
-    from e2efly.viewing.noise_plots import plot_depth_noise, plot_image_noise, plot_imu
     from e2efly.viewing.places import find_place
 
     place, camera = find_place("corridor", random_key(0)), sized(PRESETS["d435i"], 320, None, None)
@@ -276,10 +276,10 @@ def noise() -> None:
 
 def families() -> None:
     """docs/any_vehicle.png: what the ranges of `any` draw."""
+    from family_plot import plot_family
     from PIL import Image
 
     from e2efly.vehicles.family import load_family
-    from e2efly.viewing.family_plot import plot_family
 
     family, path = load_family("any"), DOCS / "any_vehicle.png"
     assert family is not None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from vehicle_drawing import Mounted, drawing
 
 from e2efly.alignment.parts import Part, prototype, read_on_the_ground, read_parts
 from e2efly.alignment.purchases import Purchase
@@ -20,7 +21,6 @@ from e2efly.policy.zoo import policy_file
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.viewing.vehicle_drawing import Mounted, drawing
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parts: written by `make docs` -->", "<!-- end of the parts -->"

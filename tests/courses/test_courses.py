@@ -14,7 +14,7 @@ import pytest
 from e2efly.courses import tracks
 from e2efly.courses.gates import Gates
 from e2efly.courses.origin import Origin
-from e2efly.courses.references import Lissajous, Polynomials, Spline, read_csv
+from e2efly.courses.references import Lissajous, Spline, read_csv
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.environment import random_key
 from e2efly.policy.goal import Shape
@@ -49,14 +49,6 @@ def test_a_spline_is_the_same_on_both_libraries() -> None:
     np.testing.assert_array_equal(ours[2, 0], spline.position(np.full((4, 1), 50.0))[2, 0])
 
 
-def test_polynomials_worked_out_beforehand_are_the_spline() -> None:
-    random, time = polynomial(random_key(1), (0.0, 0.0, 3.0), 2.0, 2.5, 1, 23), np.linspace(-1, 12, 333)
-    spline = Spline(np.asarray(random.knots, np.float64), end=9.7)
-    path = Polynomials.of(spline).position(time)
-    assert path.shape == (333, 3)
-    np.testing.assert_allclose(path, spline.position(time[None])[0], atol=1e-12)
-
-
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("name", track_names())
 def test_gates_are_judged_alike_on_both_libraries(name: str) -> None:
@@ -80,15 +72,6 @@ def test_an_origin_turns_then_moves() -> None:
     origin = Origin((10.0, 20.0, 1.0), np.pi / 2)
     np.testing.assert_allclose(origin.points((1.0, 2.0, 3.0)), [8.0, 21.0, 4.0], atol=1e-12)
     np.testing.assert_allclose(origin.vectors(np.array([[1.0, 0.0, 0.0]])), [[0.0, 1.0, 0.0]], atol=1e-12)
-
-
-@pytest.mark.parametrize("curve", CURVES)
-def test_a_placed_spline_is_the_placed_path(curve: Lissajous) -> None:
-    origin, time = Origin((1.0, -2.0, 0.5), 0.7), np.linspace(0, 11, 100)[None]
-    spline = curve.spline((0.0, 0.0, 3.0), np.zeros(1), 23)
-    placed = origin.spline(spline)
-    np.testing.assert_allclose(placed.position(time), origin.points(spline.position(time)), atol=1e-12)
-    assert not np.allclose(placed.position(time), spline.position(time))
 
 
 @pytest.mark.parametrize("name", track_names())

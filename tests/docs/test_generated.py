@@ -31,7 +31,9 @@ def script(name: str, folder: Path = DOCS) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)  # a script finds the files beside it
+        spec.loader.exec_module(module)
     return module
 
 

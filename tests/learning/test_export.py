@@ -13,7 +13,7 @@ from e2efly.config import EnvConfig, ImuConfig, NetworkConfig, TrainConfig
 from e2efly.control import COMMAND_MODES
 from e2efly.environment import Env
 from e2efly.learning.networks import ACTIVATIONS, Actor, Layers, Weights, init_mlp
-from e2efly.learning.onnx_export import contract_of, export_policy, parity
+from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.policy.contract import METADATA_KEY, Contract
 from e2efly.policy.loader import load_policy
 from e2efly.policy.observation import ATTITUDE, BODY_RATE, VELOCITY, Field, past_actions
@@ -21,6 +21,7 @@ from e2efly.policy.random_inputs import random_observations
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
+from tests.learning.parity import parity
 
 GOALS = Field("goals", 6, "world", "m", 3.0, "two positions minus vehicle position")
 

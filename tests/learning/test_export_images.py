@@ -15,7 +15,7 @@ from e2efly.config import CameraConfig, EnvConfig, ImuConfig, NetworkConfig, Rew
 from e2efly.environment import Env
 from e2efly.environment.episodes import Act
 from e2efly.learning.networks import Actor, View, Weights
-from e2efly.learning.onnx_export import contract_of, export_policy, parity
+from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.learning.programs import acting
 from e2efly.policy.loader import load_policy
 from e2efly.policy.random_inputs import random_images, random_observations
@@ -23,6 +23,7 @@ from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory, run_of
 from e2efly.validation.evaluation import act_of, check_observation, config_from_contract
 from e2efly.vehicles.loading import load_vehicle
+from tests.learning.parity import parity
 
 DEPTH = CameraConfig("depth", width=16, height=12, reach=(0.3, 8.0), rate=15.0, latency=(0.0, 0.05))
 MASK, RGB = CameraConfig("mask", width=16, height=16), CameraConfig("rgb", width=8, height=8)

@@ -13,7 +13,7 @@ from e2efly.config import NetworkConfig, TrainConfig
 from e2efly.environment import Env, random_key
 from e2efly.environment.episodes import Act, run_episodes
 from e2efly.learning.devices import OWN, SAME, on_each, share
-from e2efly.learning.programs import Programs, _chunk, evaluation_program, start_program
+from e2efly.learning.programs import Programs, _chunk, _evaluate, start_program
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.tasks import TASKS
@@ -83,8 +83,12 @@ def test_an_evaluation_is_the_same_on_one_device_and_on_two() -> None:
     setup = Setup.of(config())
     layers = setup.algorithm.init(setup.env, setup.config.algo, 0).policy
     env = next(iter(setup.judges.values()))
-    two = evaluation_program(setup)(env, layers, random_key(5))
-    one = evaluation_program(dataclasses.replace(setup, devices=1))(env, layers, random_key(5))
+    two, one = (
+        on_each(_evaluate(each), each.devices, (SAME, SAME, SAME), SAME, vehicles=each.watched)(
+            env, layers, random_key(5)
+        )
+        for each in (setup, dataclasses.replace(setup, devices=1))
+    )
     assert one.duration.shape == (9,)
     assert two.duration.shape == (10,)
     for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(two), strict=True):

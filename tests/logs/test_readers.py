@@ -15,7 +15,7 @@ from e2efly.logs.csv_file import column_map, read_csv, write_csv
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.mcap_records import MAGIC
 from e2efly.logs.readers import read_flights, read_part
-from e2efly.logs.recording import Record, Stream, stream_table
+from e2efly.logs.recording import KINDS, Record, Stream
 from e2efly.logs.telemetry import Telemetry
 from tests.logs.log_samples import HALF, crazyflie, fly, ulog
 
@@ -210,4 +210,8 @@ def test_what_is_no_log_is_refused_by_name(tmp_path: Path, name: str, make: Call
 
 def test_the_documentation_has_all_columns() -> None:
     page = Path(__file__).parents[2] / "docs" / "identification.md"
-    assert stream_table() in page.read_text(encoding="utf-8")
+    rows = ["| stream | columns of a CSV file | unit | what |", "| --- | --- | --- | --- |", "| | `t` | s | time |"]
+    for name, kind in KINDS.items():
+        columns = " ".join(f"`{column}`" for column in kind.columns)
+        rows.append(f"| {name} | {columns} | {kind.unit} | {kind.what} |")
+    assert "\n".join(rows) in page.read_text(encoding="utf-8")

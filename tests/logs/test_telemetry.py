@@ -16,7 +16,7 @@ import pytest
 from mcap.reader import make_reader
 
 from e2efly.logs import telemetry
-from e2efly.logs.channels import CHANNELS, channel_table
+from e2efly.logs.channels import CHANNELS
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 
@@ -356,7 +356,11 @@ def test_a_field_of_another_kind_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_the_documentation_lists_every_channel() -> None:
-    assert channel_table() in (ROOT / "docs" / "telemetry.md").read_text(encoding="utf-8")
+    rows = ["| channel | field | unit | what |", "| --- | --- | --- | --- |"]
+    for channel in CHANNELS.values():
+        rows.append(f"| **{channel.name}** | | | {channel.description} |")
+        rows.extend(f"| | `{f.name}` | {f.unit} | {f.description} |" for f in channel.fields)
+    assert "\n".join(rows) in (ROOT / "docs" / "telemetry.md").read_text(encoding="utf-8")
 
 
 def test_no_file_stays_open(tmp_path: Path) -> None:

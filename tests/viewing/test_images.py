@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from docs.noise_plots import plot_depth_noise, plot_image_noise, plot_imu
 
 from e2efly.config import CameraConfig, ImuConfig
 from e2efly.environment import random_key
 from e2efly.simulation.scenes.scene import COLOURS, GROUND, Scene
 from e2efly.viewing.cloud import cloud
 from e2efly.viewing.image_plots import DISTANCE, ImageSight, exposure, in_colours, look_around
-from e2efly.viewing.noise_plots import plot_depth_noise, plot_image_noise, plot_imu
 from tests.viewing.test_plots import check_png
 
 CAMERA = CameraConfig(width=32, height=16, fov=(1.4, 0.8), pitch=0.5, reach=(0.3, 6.0))

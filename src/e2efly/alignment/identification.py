@@ -79,27 +79,8 @@ class Found:
     structures: dict[str, np.ndarray]
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
 
-    def drag_at(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """Drag along each axis at a speed, m/s, and its standard deviation, (3,) N.
 
-        A flight determines the drag at its own speeds better than the division into a linear and a quadratic part.
-        """
-        covariance = _whole_covariance(self.fit, self.sigma)
-        value, sigma = np.zeros(3), np.zeros(3)
-        for axis in range(3):
-            slope = np.zeros(len(self.p))
-            for power, name in ((1, "drag_linear"), (2, "drag_quadratic")):
-                part = float(getattr(self.model.base, name)[axis]) * speed**power
-                for i, unknown in enumerate(self.model.unknowns):
-                    if unknown.field == name and axis in unknown.entries:
-                        part *= float(np.exp(self.p[i]))
-                        slope[i] = part
-                value[axis] += part
-            sigma[axis] = np.sqrt(slope @ covariance @ slope)
-        return value, sigma
-
-
-def _whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
+def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
     """The covariance with these standard deviations and the correlations of the fit."""
     spread = np.sqrt(np.diag(found.covariance))
     return found.covariance / np.outer(spread, spread) * np.outer(sigma, sigma)
@@ -204,7 +185,7 @@ def identify(
     sigma = sigmas(model, found)
     impossible = _impossible(model, found.p)
     refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
-    p = _given(found.p, _whole_covariance(found, sigma), refused)
+    p = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
         if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
             break
@@ -216,7 +197,7 @@ def identify(
         more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
         if np.all(more == refused):
             break
-        refused, p = more, _given(found.p, _whole_covariance(found, sigma), more)
+        refused, p = more, _given(found.p, whole_covariance(found, sigma), more)
     structures = _structures(model, seen, p, refused)
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))

@@ -30,10 +30,6 @@ class Purchase:
     estimate: dict[str, str]
     """For a number of `TOLD` that no public page says as it stands here, how it was estimated."""
 
-    def unfounded(self, numbers: tuple[str, ...] = TOLD) -> list[str]:
-        """Those of the numbers that have neither a page nor the word that they are estimated."""
-        return [name for name in numbers if name not in self.source and name not in self.estimate]
-
 
 def read_purchase(where: str, entry: dict[str, Any], count: int) -> Purchase:
     """The keys of an entry that are about buying it.

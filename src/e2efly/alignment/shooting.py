@@ -61,10 +61,7 @@ class Fit:
     """(u, u) covariance of `p` for white residuals: that of Gauss-Newton."""
     noise: dict[str, float]
     """Spread of each sensor about the fitted model."""
-    cost: float
     iterations: int
-    starts: np.ndarray
-    """(n, START) the fitted starts of the windows, as corrections of the measured ones."""
 
 
 def fit(
@@ -178,7 +175,7 @@ def _fit(
     np.add.at(groups, group, each)
     inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
     sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
-    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, cost, i, starts)
+    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, i)
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.table import Table
 
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.storage import write_json
 
 
@@ -47,8 +46,7 @@ def run(options: AirsimSettings) -> int:
     console.print(f"Settings: {options.out}")
     for option in named(images):
         console.print(f"Its camera in `e2efly validate --plant airsim`: {option}")
-    headings = "what settings.json cannot say", vehicle.name, "where AirSim has it"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed("what settings.json cannot say", vehicle.name, "where AirSim has it")
     for row in unsaid(vehicle, images):
         table.add_row(*row)
     console.print(table)

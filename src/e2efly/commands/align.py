@@ -10,7 +10,7 @@ import tyro
 from rich.table import Table
 
 from e2efly.commands.log_options import LogOptions, show_notes
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.storage import write_json
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
@@ -180,7 +180,7 @@ def _report(options: Align, vehicle: Vehicle, found: "Alignment", records: "list
 
 
 def _parameters(vehicle: Vehicle, found: "Alignment") -> Table:
-    table = Table("parameter", "before", "aligned", "sigma", box=None, header_style="bold", pad_edge=False)
+    table = headed("parameter", "before", "aligned", "sigma")
     for row in _rows(vehicle, found):
         factor, unit = (1e3, "ms") if row["unit"] == "s" else (1.0, row["unit"])
         told = [f"{factor * row[key]:.{digits}g} {unit}" for key, digits in (("before", 4), ("after", 4), ("sigma", 2))]
@@ -191,9 +191,7 @@ def _parameters(vehicle: Vehicle, found: "Alignment") -> Table:
 def _errors(found: "Alignment") -> Table:
     from e2efly.alignment.replay import SIGNALS
 
-    table = Table(
-        "error where the fit did not look (rms)", "before", "aligned", box=None, header_style="bold", pad_edge=False
-    )
+    table = headed("error where the fit did not look (rms)", "before", "aligned")
     for name, before in found.before.items():
         told = [f"{value:.3g} {SIGNALS[name]}" for value in (before, found.after[name])]
         table.add_row(name.replace("_", " "), *told)

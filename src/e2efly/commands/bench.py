@@ -43,10 +43,14 @@ def measure() -> dict[str, float]:
     import jax
 
     from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
+    from e2efly.runs import presets
+
+    def training(algo: str) -> float:
+        return training_steps(presets.starting("hover", algo, presets.NOMINAL, device=jax.default_backend()))
 
     return {
         "physics sub-steps, 1024 vehicles": physics_substeps(1024),
         "environment steps, 1024 environments, hover": environment_steps("hover", 1024),
-        "PPO training steps, hover preset": training_steps("hover", "ppo", device=jax.default_backend()),
-        "BPTT training steps, hover preset": training_steps("hover", "bptt", device=jax.default_backend()),
+        "PPO training steps, hover preset": training("ppo"),
+        "BPTT training steps, hover preset": training("bptt"),
     }

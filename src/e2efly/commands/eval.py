@@ -11,9 +11,9 @@ from rich.table import Table
 
 from e2efly.commands.helping import asks_help
 from e2efly.commands.options import parse as parse_options
-from e2efly.commands.policies import named_first, values, with_task
+from e2efly.commands.policies import Asked, named_first, values, with_task
 from e2efly.commands.rows import check_stress, report_stress
-from e2efly.commands.terminal import Terminal, seconds
+from e2efly.commands.terminal import Terminal, headed, seconds
 from e2efly.config import EnvConfig, TaskConfig
 from e2efly.config.run import TIMED
 from e2efly.config.storage import write_json
@@ -66,19 +66,7 @@ class Eval:
     cameras' images."""
 
 
-@dataclass(frozen=True)
-class AskedEval:
-    """What `e2efly eval` is asked to do."""
-
-    options: Eval
-    """As given."""
-    env: dict[str, Any]
-    """Values of `--env` that differ from the policy's own, by dotted name."""
-    task: dict[str, Any]
-    """The same for `--task`."""
-
-
-def parse(arguments: list[str]) -> AskedEval:
+def parse(arguments: list[str]) -> Asked:
     """The options of `eval`. The defaults of `--env` and `--task` come from the policy's run or contract.
 
     Raises:
@@ -86,7 +74,7 @@ def parse(arguments: list[str]) -> AskedEval:
     """
     given = [argument for argument in arguments if argument.startswith(("--env.", "--task."))]
     if not given or asks_help(arguments):
-        return AskedEval(parse_options(Eval, "eval", arguments), {}, {})
+        return Asked(parse_options(Eval, "eval", arguments), {})
     found = named_first("eval", arguments, given[0])
     from e2efly.validation.evaluation import pinned
 
@@ -99,10 +87,10 @@ def parse(arguments: list[str]) -> AskedEval:
     env = options.env
     if not any(argument.startswith("--env.randomize") for argument in given):
         env = dataclasses.replace(env, randomize=own.randomize)
-    return AskedEval(options, values(own, env), values(found.task, options.task))
+    return Asked(options, values(found.task, options.task), values(own, env))
 
 
-def run(asked: AskedEval) -> int:
+def run(asked: Asked) -> int:
     """Fly the ONNX file itself from unseen starts. Print a table; write the report and the plots.
 
     Returns:
@@ -153,9 +141,7 @@ def _table(evaluated: "Evaluation", episodes: int) -> Table:
 
     found = {name: summary(e) for name, e in evaluated.flown.items()}
     errs = evaluated.candidate.task.precision not in TIMED  # the distance from the goal is meaningful
-    table = Table(
-        f"of {episodes} starts, {evaluated.candidate.vehicles}", *found, box=None, header_style="bold", pad_edge=False
-    )
+    table = headed(f"of {episodes} starts, {evaluated.candidate.vehicles}", *found)
 
     def row(heading: str, show: Callable[[dict[str, Any]], str]) -> None:
         table.add_row(heading, *(show(s) for s in found.values()))

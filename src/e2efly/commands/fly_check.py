@@ -9,6 +9,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from e2efly.commands.terminal import headed
 from e2efly.flight.betaflight.messages import StatusEx
 from e2efly.flight.betaflight.row import Row, command_lines, problems
 from e2efly.flight.bridge import Bridge
@@ -41,8 +42,7 @@ def print_settings(console: Console, rows: tuple[Row, ...]) -> None:
     """Print each setting of the controller: its value and the required value. Below follow whole lines that can be
     pasted into the controller's command line, which ignores what begins with `#`.
     """
-    headings = "", "setting", "is", "needed"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed("", "setting", "is", "needed")
     for row in rows:
         mark = Text("ok", "green") if row.good else Text("no", "bold red")
         mark = mark if row.told else Text("look", "yellow")

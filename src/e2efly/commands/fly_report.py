@@ -9,7 +9,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, headed
 
 LONGEST = 20
 """At most this many of the times at which the filter intervened are printed."""
@@ -66,7 +66,7 @@ def _print(console: Console, table: dict[str, Any]) -> None:
     if table["cut_off"]:
         console.print("Cut off", style="bold", end=": ")
         console.print(f"{table['cut_off']}; what follows is what was written until then")
-    modes = Table("mode", "from", "to", "error rms / max", "why", box=None, header_style="bold", pad_edge=False)
+    modes = headed("mode", "from", "to", "error rms / max", "why")
     for row in table["modes"]:
         error = table["error_m"].get(row["mode"])
         told = f"{100 * error['rms']:.1f} / {100 * error['max']:.1f} cm" if error else "-"
@@ -87,7 +87,7 @@ def _print(console: Console, table: dict[str, Any]) -> None:
 def _filter(found: dict[str, Any]) -> Table:
     """Where the filter intervened."""
     title = f"the filter changed {found['commands']} of {found['of']} commands of the policy"
-    table = Table("for", "from", "to", "commands", "largest share", box=None, header_style="bold", pad_edge=False)
+    table = headed("for", "from", "to", "commands", "largest share")
     table.title, table.title_justify = title, "left"
     for row in found["stepped_in"][:LONGEST]:
         times = f"{row['start_s']:.2f} s", f"{row['end_s']:.2f} s"

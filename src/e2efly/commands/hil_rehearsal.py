@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly.commands.hil_options import Hil
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.budget import check_time
 from e2efly.config.storage import held, write_json
 from e2efly.courses.origin import Origin
@@ -125,8 +125,7 @@ def as_json(laps: "list[Lap]") -> dict[str, Any]:
 
 def laps_table(laps: "list[Lap]") -> Table:
     """A row for every flight."""
-    headings = "world", "", "policy", "top speed", "pose to image", "image age", "steps late", "room behind"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed("world", "", "policy", "top speed", "pose to image", "image age", "steps late", "room behind")
     for lap in laps:
         mark = Text("ok", "green") if lap.good else Text("no", "bold red")
         spreads = lap.pose_to_image, lap.image_age, lap.lateness, lap.behind

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from e2efly.commands.log_options import LogOptions, show_notes
-from e2efly.commands.terminal import Terminal
+from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.names import unknown
 from e2efly.config.storage import held, write_json
 from e2efly.vehicles.loading import load_vehicle
@@ -256,7 +256,7 @@ def _report(
 def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
     from e2efly.logs.recording import percent
 
-    table = Table("parameter", "file", "identified", "sigma", "source", box=None, header_style="bold", pad_edge=False)
+    table = headed("parameter", "file", "identified", "sigma", "source")
     for name, e in fused.items():
         own = np.atleast_1d(np.asarray(getattr(base, name), float))
         for i, (before, value, sigma) in enumerate(

@@ -1,7 +1,7 @@
 """Options of commands whose defaults come from a policy."""
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -23,6 +23,8 @@ class Asked:
     """The options as given."""
     task: dict[str, Any]
     """Values of `--task` that differ from the policy's own, by dotted name."""
+    env: dict[str, Any] = field(default_factory=dict)
+    """The same for `--env`, in a command that has it."""
 
 
 def asked_of(options: type, command: str, arguments: list[str]) -> Asked:

@@ -4,12 +4,12 @@ import dataclasses
 import math
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from e2efly.commands.terminal import headed
 from e2efly.flight.settings import Fence
 from e2efly.tasks.route import Route, route_of
 from e2efly.validation import firmware_program
@@ -59,8 +59,7 @@ def flights_table(flights: list[Rehearsal]) -> RenderableType:
 
     The table fits 80 columns. The modes of a complete flight are always the same and are only in its JSON.
     """
-    headings = "whole flight", "complete", "hover error", "policy", "top speed"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed("whole flight", "complete", "hover error", "policy", "top speed")
     for i, flight in enumerate(flights, 1):
         mark = Text("yes", "green") if flight.complete else Text("no", "bold red")
         error = "none" if math.isnan(flight.hover_error) else f"{100 * flight.hover_error:.1f} cm"
@@ -73,9 +72,3 @@ def _modes(number: int, flight: Rehearsal) -> RenderableType:
     for mode, reason in zip(flight.modes, flight.reasons, strict=True):
         table.add_row(mode, Text(reason))
     return Group(Text(f"\nflight {number} was not complete; its modes, and why each began:"), table)
-
-
-def flight_row(flight: Rehearsal) -> dict[str, Any]:
-    """A flight as JSON, without its track. Missing values are null."""
-    row = {f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"}
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

@@ -10,6 +10,7 @@ import tyro
 
 from e2efly.commands.terminal import Terminal, counted, doing
 from e2efly.config.names import unknown
+from e2efly.config.storage import make_folder
 from e2efly.control import Quat
 from e2efly.courses.references import read_csv, through_points
 from e2efly.policy.zoo import beside, is_policy, names, policy_file
@@ -91,7 +92,7 @@ def run(options: Render) -> int:
             options.scene, random_key(options.seed), options.scene_unit, options.scene_up, options.scene_materials
         )
     out = options.out or Path("runs/render") / Path(options.scene).stem
-    _make(out)
+    make_folder(out)
     with doing(console, "Planning a flight"):
         tour = _tour(options, place)
     camera = sized(PRESETS[options.camera], PICTURE, options.width, options.height)
@@ -120,7 +121,7 @@ def _policy(options: Render) -> int:
     from e2efly.commands.watch import WatchOptions, run
 
     out = options.out or Path("runs/render") / beside(policy_file(options.scene)).name
-    _make(out)
+    make_folder(out)
     return run(WatchOptions(what=(options.scene,), seed=options.seed, video=out / "flight.gif"))
 
 
@@ -129,9 +130,8 @@ def viewpoint(options: Render, tour: Any) -> tuple[np.ndarray, np.ndarray]:
     i = len(tour.time) // 10
     yaw = float(Quat.of(tour.quaternion[i]).yaw()) if options.yaw is None else math.radians(options.yaw)
     pitch = math.radians(options.pitch)
-    cy, sy, cp, sp = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(pitch / 2), math.sin(pitch / 2)
     position = tour.position[i] if options.position is None else np.asarray(options.position)
-    return position, np.array([cy * cp, -sy * sp, cy * sp, sy * cp])
+    return position, Quat.of_euler(*np.array([0.0, pitch, yaw])).stack()
 
 
 def _tour(options: Render, place: Any) -> Any:
@@ -141,10 +141,3 @@ def _tour(options: Render, place: Any) -> Any:
         return plan(place.clearance, place.route, place.straight, PERIOD)
     spline = through_points(read_csv(options.flight))
     return Tour.of(spline.position(np.arange(0.0, spline.duration, PERIOD)[None])[0], PERIOD)
-
-
-def _make(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make --out {out}: {error.strerror}") from error

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.terminal import seconds
+from e2efly.commands.terminal import headed, seconds
 from e2efly.config.storage import write_json
 
 if TYPE_CHECKING:
@@ -69,8 +69,7 @@ def _table(found: "Report") -> Table:
     from e2efly.environment.episodes import summary
 
     count = next(len(e.success) for criteria in found.flown.values() for e in criteria.values())
-    headings = f"of {count} starts", "success", "95 % interval", "final error", "time"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed(f"of {count} starts", "success", "95 % interval", "final error", "time")
     for row, criteria in found.flown.items():
         for name, episodes in criteria.items():
             s = summary(episodes)

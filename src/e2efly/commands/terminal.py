@@ -164,9 +164,14 @@ def counted(console: Console, title: str, items: Iterable[Any], total: int) -> I
                 told = now
 
 
+def headed(*headings: str) -> Table:
+    """An empty table for `rich` with these headings, in the style of all tables."""
+    return Table(*headings, box=None, header_style="bold", pad_edge=False)
+
+
 def console_table(rows: list[dict[str, Any]]) -> Table:
     """A table for `rich`. The keys of the first row are the headings."""
-    table = Table(*rows[0], box=None, header_style="bold", pad_edge=False)
+    table = headed(*rows[0])
     for row in rows:
         table.add_row(*map(str, row.values()))
     return table

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from e2efly.commands.policies import Asked, asked_of
 from e2efly.commands.rows import check_stress, report_stress
-from e2efly.commands.terminal import Terminal, seconds
+from e2efly.commands.terminal import Terminal, headed, seconds
 from e2efly.config import TaskConfig
 from e2efly.config.budget import check_time
 from e2efly.config.storage import write_atomically, write_json
@@ -209,8 +209,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
 def _table(found: "Validation") -> Table:
     from e2efly.environment.episodes import summary
 
-    headings = "criterion", "flown in", "success", "95 %", "end error", "mean", "time", "drop"
-    table = Table(*headings, box=None, header_style="bold", pad_edge=False)
+    table = headed("criterion", "flown in", "success", "95 %", "end error", "mean", "time", "drop")
     for name, v in found.criteria.items():
         for place, e, drop in (("training", v.trained, ""), (found.plant.name, v.flown, f"{v.drop:+.1f}")):
             s = summary(e)

@@ -22,9 +22,6 @@ import numpy as np
 LOCK = ".lock"
 """Name of the file in a folder that tells who writes to it. Only the kernel's lock on this file counts."""
 
-_UNREADABLE = (OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
-"""What the standard library raises for archives that are damaged or of another kind."""
-
 
 def cache_folder() -> Path:
     """The user's cache folder of this package."""
@@ -132,6 +129,18 @@ def finite(value: Any) -> Any:
     return value
 
 
+def make_folder(folder: Path, what: str = "--out") -> None:
+    """Make a folder and those above it, if it does not exist.
+
+    Raises:
+        OSError: when the folder cannot be made. `what` names it in the error text.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make {what} {folder}: {error.strerror}") from error
+
+
 @contextmanager
 def held(folder: Path, option: str = "--out") -> Iterator[None]:
     """Keep other processes from writing to a folder. The folder is made if it does not exist.
@@ -148,10 +157,7 @@ def held(folder: Path, option: str = "--out") -> Iterator[None]:
         OSError: when the folder cannot be made, or its file system has no locks.
     """
     anew = not folder.exists()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make {option} {folder}: {error.strerror}") from error
+    make_folder(folder, option)
     path = folder / LOCK
     try:
         file = _locked(path)

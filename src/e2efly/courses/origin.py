@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.courses.references import Spline
 from e2efly.courses.tracks import RaceTrack
 
 RESIDUAL = 0.02
@@ -80,12 +79,6 @@ class Origin:
         """The origin, in the room, of a course whose own origin `inner` is given in the axes of this one."""
         x, y, z = (float(value) for value in self.points(inner.position))
         return Origin((x, y, z), self.yaw + inner.yaw)
-
-    def spline(self, spline: Spline) -> Spline:
-        """A spline of NumPy arrays, in the room."""
-        knots = self.vectors(spline.knots)
-        knots[:, :, 0] += self.position
-        return dataclasses.replace(spline, knots=knots)
 
     def track(self, track: RaceTrack) -> RaceTrack:
         """A race track, in the room."""

@@ -26,7 +26,6 @@ LONGEST = 3600.0
 """Longest reference, s. Its knots are computed beforehand."""
 _CLOSEST = 1e-3
 """Shortest time between the rows of a file, s."""
-_POWERS = np.arange(6)
 
 
 @dataclass(frozen=True)
@@ -85,26 +84,6 @@ def _quintic(a: Any, b: Any, h: float) -> tuple[Any, ...]:
     c4 = -15 * d + 8 * v0 + 7 * v1 + 3 * a0 - 2 * a1
     c5 = 6 * d - 3 * v0 - 3 * v1 - a0 + a1
     return p0, v0, a0, c3, c4, c5
-
-
-@dataclass(frozen=True)
-class Polynomials:
-    """The spline of one vehicle in NumPy with precomputed polynomials: a call takes a fifth of the time."""
-
-    spline: Spline
-    coefficients: np.ndarray
-    """(m - 1, 6, 3) coefficients of s^0 to s^5 of each piece."""
-
-    @staticmethod
-    def of(spline: Spline) -> "Polynomials":
-        """The polynomials of a spline with knots (1, m, 3, 3)."""
-        (knots,) = np.asarray(spline.knots, np.float64)
-        return Polynomials(spline, np.stack(_quintic(knots[:-1], knots[1:], spline.period), axis=1))
-
-    def position(self, time: np.ndarray) -> np.ndarray:
-        """Positions (k, 3) at the times (k,), s. Positions are held at the ends."""
-        index, s = self.spline.piece(time)
-        return np.einsum("ke,kec->kc", s[:, None] ** _POWERS, self.coefficients[index])
 
 
 def knot_count(duration: float) -> int:

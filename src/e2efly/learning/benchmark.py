@@ -2,14 +2,14 @@
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from e2efly.config import EnvConfig, NetworkConfig
+from e2efly.config import TrainConfig
 from e2efly.environment import Env, random_key
 from e2efly.learning.devices import AXIS, OWN, SAME, on_each, own, placed, share, stacked
 from e2efly.learning.programs import start_program
@@ -17,42 +17,38 @@ from e2efly.learning.setup import Setup
 from e2efly.runs import presets
 from e2efly.simulation.physics import Physics, State, step
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.vehicles.vehicle import quantities
+
+CALLS = 200
+"""Calls of a step in a measured loop."""
 
 
-def physics_substeps(vehicles: int, calls: int = 200, general: bool = False) -> float:
+def physics_substeps(vehicles: int, plants: Mapping[str, np.ndarray] | None = None) -> float:
     """Physics sub-steps per second of VIS-R under CTBR commands: 10 sub-steps of 5 ms per call, all in one scan.
 
-    With `general`, every vehicle has its own value of every parameter. Otherwise the parameters are constants of the
-    program.
+    `plants`: the parameters of which every vehicle has its own value, (n, ...). The others are constants.
     """
     vehicle = load_vehicle("vis_r")
     physics = Physics.of(vehicle, control_rate=20.0)
     devices = share(vehicles, None, None)
     state = State.hovering(vehicle, jnp.zeros((vehicles, 3), jnp.float32))
-    rng = np.random.default_rng(0)
-    command = (0.5 * rng.normal(size=(vehicles, 4)) + np.array([9.81, 0, 0, 0])).astype(np.float32)
-    plants: dict[str, Any] = {}
-    for name in (field.name for field in quantities() if general):
-        value = np.asarray(getattr(physics.nominal, name))
-        plants[name] = (value * rng.uniform(0.9, 1.1, (vehicles, *value.shape))).astype(np.float32)
+    command = (0.5 * np.random.default_rng(0).normal(size=(vehicles, 4)) + np.array([9.81, 0, 0, 0])).astype(np.float32)
 
     def run(state: State, command: jax.Array, plants: dict[str, Any]) -> State:
         plant = dataclasses.replace(physics.nominal, **plants)
         body = lambda s, _: (step(physics, plant, s, command), None)  # noqa: E731
-        return jax.lax.scan(body, state, None, length=calls)[0]
+        return jax.lax.scan(body, state, None, length=CALLS)[0]
 
     program = on_each(run, devices, (OWN, OWN, OWN), OWN, vehicles=vehicles // devices)
-    start = placed((state, command, plants), devices)
-    return best_rate(vehicles * calls * physics.substeps, lambda: jax.block_until_ready(program(*start)))
+    start = placed((state, command, dict(plants or {})), devices)
+    return best_rate(vehicles * CALLS * physics.substeps, lambda: jax.block_until_ready(program(*start)))
 
 
-def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvConfig | None = None) -> float:
+def environment_steps(task: str, envs: int) -> float:
     """Environment steps per second with random actions. Everything is included: latency, reward, new starts,
     randomisation.
     """
     config = presets.preset(task, "ppo")
-    env_config = env_config or dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
+    env_config = dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
     env = Env.of(config.task, config.reward, env_config)
     devices = share(envs, None, None)
     actions = np.random.default_rng(0).uniform(-0.5, 0.2, (envs, 16, 4)).astype(np.float32)
@@ -65,33 +61,15 @@ def environment_steps(task: str, envs: int, steps: int = 200, env_config: EnvCon
             carry, out = env.step(carry, actions[:, i % 16])
             return carry, jnp.sum(out.observation) + jnp.sum(out.reward)
 
-        return stacked(jax.lax.scan(body, own(state), jnp.arange(steps)))
+        return stacked(jax.lax.scan(body, own(state), jnp.arange(CALLS)))
 
     state = on_each(start, devices, (SAME, SAME), OWN)(env, random_key(0))
     program, actions = on_each(run, devices, (SAME, OWN, OWN), OWN, vehicles=envs // devices), placed(actions, devices)
-    return best_rate(envs * steps, lambda: jax.block_until_ready(program(env, state, actions)))
+    return best_rate(envs * CALLS, lambda: jax.block_until_ready(program(env, state, actions)))
 
 
-_OWN = (
-    "mass", "inertia", "rotor_position", "thrust_map", "torque_ratio", "motor_time_constant", "drag_linear",
-    "drag_quadratic",
-)  # fmt: skip
-GENERAL = dict.fromkeys(_OWN, 0.1)
-"""Relative ranges of the parameters that are drawn anew in every episode, so that every vehicle is different."""
-
-
-def training_steps(task: str, algo: str, wide: bool = False, general: bool = False, device: str = "cpu") -> float:
-    """Environment steps per second of training with the preset nominal, in its sizes for a device.
-
-    With `wide`: 100 environments, horizon 96, networks with 192 and 96 units. With `general`: every vehicle has its own
-    parameters.
-    """
-    config = presets.starting(task, algo, presets.NOMINAL, device=device)
-    if general:
-        config = dataclasses.replace(config, env=dataclasses.replace(config.env, randomize=GENERAL))
-    if wide and config.algo.exact:
-        algo_config = dataclasses.replace(config.algo, envs=100, horizon=96)
-        config = dataclasses.replace(config, algo=algo_config, network=NetworkConfig((192, 96)))
+def training_steps(config: TrainConfig) -> float:
+    """Environment steps per second of training."""
     setup = Setup.of(config)
     parameters = setup.algorithm.init(setup.env, config.algo, 0)
 

@@ -18,11 +18,9 @@ from e2efly.learning.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.learning.onnx_layers import policy_graph
 from e2efly.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.policy.images import NONE, Image
-from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import sealed
 from e2efly.policy.onnx_graph import IR_VERSION, OPSET
 from e2efly.policy.onnx_session import remember
-from e2efly.policy.random_inputs import random_images, random_observations
 from e2efly.tasks import TASKS
 from e2efly.vehicles.family import load_family, nominal_vehicle
 from e2efly.vehicles.vehicle import quantities, terms
@@ -178,34 +176,6 @@ def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None
     content = sealed(model.SerializeToString())
     remember(content)
     write_atomically(Path(path), content)
-
-
-def parity(path: Path, weights: Weights, actor: Actor, count: int = 10_000, seed: int = 0) -> float:
-    """The largest absolute difference between the actions of an exported policy and those of the original policy.
-
-    Both act on random observations and images. A GRU also starts from random memories.
-
-    Args:
-        path: the `policy.onnx`, run in the same way as on the vehicle.
-        weights: as for `export_policy`.
-        actor: as for `export_policy`.
-        count: number of random observations.
-        seed: seed of the observations.
-
-    Returns:
-        The largest difference of the actions, whose range is [-1, 1].
-    """
-    rng, exported = np.random.default_rng(seed), load_policy(path)
-    observation = random_observations(rng, actor.features.fields, count)
-    images = [random_images(rng, image, count) for image in exported.contract.images]
-    memory = rng.uniform(-1, 1, (count, actor.network.recurrent)).astype(np.float32)
-
-    @jax.jit
-    def wanted(weights: Weights, observation: Any, images: Any, memory: Any) -> Any:
-        return actor(weights, actor.features(observation, images), memory)
-
-    both = zip(exported.act(observation, images, memory), wanted(weights, observation, images, memory), strict=True)
-    return float(max(np.max(np.abs(a - np.asarray(b)), initial=0.0) for a, b in both))
 
 
 def _check(weights: Weights, actor: Actor) -> None:

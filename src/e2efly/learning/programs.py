@@ -102,13 +102,6 @@ def start_program(setup: Setup) -> Any:
     return on_each(start, setup.devices, (SAME, SAME, SAME), OWN)
 
 
-def evaluation_program(setup: Setup) -> Any:
-    """The program (environment, weights, key) -> `Episodes` of `eval_episodes` starts, or of a few more, which are
-    repetitions.
-    """
-    return on_each(_evaluate(setup), setup.devices, (SAME, SAME, SAME), SAME, vehicles=setup.watched)
-
-
 def _chunk(setup: Setup) -> Callable[..., tuple[TrainState, dict[str, jax.Array]]]:
     def chunk(
         env: Env, algo: Any, state: TrainState, first: jax.Array, updates: jax.Array

@@ -202,12 +202,3 @@ def json_schema(channel: Channel) -> dict[str, Any]:
         for f in channel.fields
     }
     return {"title": channel.name, "description": channel.description, "type": "object", "properties": fields}
-
-
-def channel_table() -> str:
-    """All channels and fields as a Markdown table, for the documentation."""
-    rows = ["| channel | field | unit | what |", "| --- | --- | --- | --- |"]
-    for channel in CHANNELS.values():
-        rows.append(f"| **{channel.name}** | | | {channel.description} |")
-        rows.extend(f"| | `{f.name}` | {f.unit} | {f.description} |" for f in channel.fields)
-    return "\n".join(rows)

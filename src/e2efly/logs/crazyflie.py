@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from e2efly.control import Quat
 from e2efly.logs.recording import Record, Streams, listed
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -28,10 +29,8 @@ def _times(factor: float) -> Turn:
 
 def _attitude(degrees: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw in degrees, of which the pitch is positive with the nose up, as wxyz."""
-    roll, pitch, yaw = (np.radians(degrees) * [0.5, -0.5, 0.5]).T
-    (a, b, c), (x, y, z) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    q = [a * b * c + x * y * z, x * b * c - a * y * z, a * y * c + x * b * z, a * b * z - x * y * c]
-    return np.stack(q, -1)
+    roll, pitch, yaw = np.radians(degrees).T
+    return Quat.of_euler(roll, -pitch, yaw).stack()
 
 
 def _entries(group: str, names: str) -> tuple[str, ...]:

@@ -160,12 +160,3 @@ def plain(text: str) -> str:
 def percent(share: float) -> str:
     """A share for people, with two digits and no exponent."""
     return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
-
-
-def stream_table() -> str:
-    """All streams and their columns as a Markdown table, for the documentation."""
-    rows = ["| stream | columns of a CSV file | unit | what |", "| --- | --- | --- | --- |", "| | `t` | s | time |"]
-    for name, kind in KINDS.items():
-        columns = " ".join(f"`{column}`" for column in kind.columns)
-        rows.append(f"| {name} | {columns} | {kind.unit} | {kind.what} |")
-    return "\n".join(rows)

@@ -146,11 +146,6 @@ class RuntimeState:
     done: bool = False
     """Whether the task is over, but not because of a failure in flight."""
 
-    @property
-    def missed(self) -> int:
-        """Number of periods in which the policy was not called."""
-        return self.slots - self.steps
-
 
 @dataclass(frozen=True)
 class Decision:

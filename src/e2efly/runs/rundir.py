@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from e2efly.config import EnvConfig, TrainConfig
-from e2efly.config.storage import held, read_json, write_atomically, write_json
+from e2efly.config.storage import held, make_folder, read_json, write_atomically, write_json
 from e2efly.runs.inputs import Kept, by_content, copied, differences, from_json, to_json, with_copies
 
 _FILES = (
@@ -110,10 +110,7 @@ class RunDirectory:
         if overwrite:  # only now, because the input files may belong to the run that is deleted
             self.clear()
         self.check_new()
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OSError(f"cannot make --out {self.path}: {error.strerror}") from error
+        make_folder(self.path)
         self.metrics.unlink(missing_ok=True)  # of a run that never reached a checkpoint
         for kept, data in inputs.values():
             kept.copy.parent.mkdir(parents=True, exist_ok=True)

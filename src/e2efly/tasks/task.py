@@ -157,6 +157,12 @@ def uniform(key: PRNGKeyArray, n: int, size: int) -> Float[Array, "n size"]:
     return jax.random.uniform(key, (n, size), minval=-1.0, maxval=1.0)
 
 
+def between(ends: tuple[Any, Any], u: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Uniform numbers in [-1, 1] as uniform numbers between two ends."""
+    low, high = ends
+    return (low + high) / 2 + (high - low) / 2 * u
+
+
 def into_ball(cube: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
     """Map uniform points of the cube [-1, 1]^3 to uniform points of the unit ball."""
     u, z, turn = cube[:, 0], cube[:, 1], jnp.pi * cube[:, 2]

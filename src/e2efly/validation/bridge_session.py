@@ -14,6 +14,7 @@ from e2efly.flight.betaflight.settings_check import hover_schedule
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.filter.filter import Filter
+from e2efly.flight.flight_loop import LOWEST_RATE, loop_rate
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController
@@ -26,17 +27,10 @@ from e2efly.policy.worker import PolicyWorker
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.vehicle import Vehicle
 
-CONTROL_HZ = 100.0
-"""Lowest rate of the bridge, Hz."""
 REACH = 20.0
 """Usual size of the fence about the origin, m."""
 PATIENCE_S = 60.0
 """Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
-
-
-def loop_rate(control_rate: float) -> float:
-    """The lowest multiple of a policy's rate that is at least `CONTROL_HZ`."""
-    return control_rate * max(int(np.ceil(CONTROL_HZ / control_rate - 1e-9)), 1)
 
 
 @dataclass
@@ -56,18 +50,6 @@ class FlownSession:
     def where(self, mode: str) -> np.ndarray:
         """The steps in a mode."""
         return np.flatnonzero(np.array(self.mode) == mode)
-
-    def errors(self, mode: str, settle: float = 0.0, last: float | None = None) -> np.ndarray:
-        """Distance to the goal in a mode, m, without its first `settle` s, or only over its `last` s."""
-        steps = self.where(mode)
-        if not len(steps):
-            return np.array([])
-        t = np.array(self.time)[steps]
-        begin = t[0] + settle if last is None else t[-1] - last
-        return np.array([
-            np.linalg.norm(self.position[i] - goal)
-            for i, at in zip(steps, t, strict=True) if at >= begin and (goal := self.goal[i]) is not None
-        ])  # fmt: skip
 
 
 class Session:
@@ -100,7 +82,7 @@ class Session:
         self.client = Client(link or open_link(rig.sitl.msp), asked)
         self.info = identify(self.client, 3.0, clock=rig)
         self.worker: PolicyWorker | None = None
-        rate = CONTROL_HZ
+        rate = LOWEST_RATE
         if policy is not None and course is not None:
             rate = loop_rate(policy.contract.control_rate_hz)
             runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras))

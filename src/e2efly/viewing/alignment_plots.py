@@ -43,12 +43,12 @@ def both(alignment: Alignment, flown: Stretches) -> tuple[dict[str, np.ndarray],
     return replay(before, np.zeros(len(before.names)), flown), replay(found.model, found.p, flown)
 
 
-def plot_steps(path: Path, alignment: Alignment, record: Record, title: str = "Response to steps") -> None:
+def plot_steps(path: Path, alignment: Alignment, record: Record) -> None:
     """The paper's figure: a step of each body rate and of the thrust, and the responses to it."""
     notes = [
         f"The clearest step of each command in {record.path.name}. The simulator starts as measured, at the left edge."
     ]
-    with figure(path, title, 6.0, notes) as fig:
+    with figure(path, "Response to steps", 6.0, notes) as fig:
         for place, channel in enumerate((1, 2, 3, 0), 1):
             ax = fig.add_subplot(2, 2, place)
             ax.set_ylabel(STEPPED[channel])

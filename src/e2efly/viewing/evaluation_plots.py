@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from e2efly.config.run import criterion
+from e2efly.config.storage import make_folder
 from e2efly.environment import UNSEEN, Env, random_key
 from e2efly.environment.episodes import Episodes
 from e2efly.learning.judge import REPORTED
@@ -29,7 +30,7 @@ def plot_evaluation(found: Evaluation, folder: Path) -> None:
     Raises:
         OSError: when the folder cannot be created.
     """
-    _make(folder)
+    make_folder(folder, "the folder of the plots")
     flew = found.candidate
     contract, suites = flew.policy.contract, flew.task.criteria()
     title, key = f"{contract.task} on {contract.vehicle}", random_key(found.seed, UNSEEN, 0)
@@ -52,7 +53,7 @@ def plot_run(run: RunDirectory, setup: Setup, flown: dict[str, Episodes]) -> Non
     """
     folder, config = run.plots, setup.config
     title = f"{config.task.name} on {setup.env.physics.nominal.name}"
-    _make(folder)
+    make_folder(folder, "the folder of the plots")
     suites, act = config.task.criteria(), act_of(load_policy(run.policy))
     for name, env in (setup.nominal or setup.judges).items():
         tag = f"{title}: {name}" if len(suites) > 1 else title
@@ -63,13 +64,6 @@ def plot_run(run: RunDirectory, setup: Setup, flown: dict[str, Episodes]) -> Non
     vehicles = next(iter((setup.nominal or setup.judges).values())).vehicles
     plots.plot_errors(flown, folder / "errors.png", f"{title}, {vehicles}", plots.limits(suites))
     _learned(run, folder, title, criterion(config.stop_at, setup.env.vehicles), setup.env.vehicles)
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
 
 
 def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str, note: str) -> None:

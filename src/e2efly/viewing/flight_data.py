@@ -1,7 +1,6 @@
 """The data of a flight log for a report: intervals of modes, responses, and figures of merit as plain numbers."""
 
 import datetime
-import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.config.storage import finite
 from e2efly.control import Quat
 from e2efly.logs.blackbox import Blackbox, LogClock
 from e2efly.logs.flight_log import FlightLog, Series
@@ -200,7 +200,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogCloc
             "clock_drift": alignment.drift,
             "rate_response": {axis: _response(r) for axis, r in blackbox_responses(blackbox).items()},
         }
-    return _json(table)
+    return finite(table)
 
 
 def _errors(log: FlightLog, modes: list[Interval]) -> dict[str, dict[str, float]]:
@@ -244,12 +244,3 @@ def _last(x: np.ndarray) -> int | None:
 def _largest(x: np.ndarray) -> float | None:
     x = x[np.isfinite(x)]
     return float(x.max()) if len(x) else None
-
-
-def _json(value: Any) -> Any:
-    """The same value with None in place of every number that is not finite."""
-    if isinstance(value, Mapping):
-        return {key: _json(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_json(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

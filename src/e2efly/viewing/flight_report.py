@@ -136,20 +136,17 @@ def plot_rates(log: FlightLog, path: str | Path) -> None:
         axes[-1][1].xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
-def plot_response(
-    by_source: dict[str, dict[str, StepResponse]], path: str | Path, title: str = "Rate loop: response to a step"
-) -> None:
+def plot_response(by_source: dict[str, dict[str, StepResponse]], path: str | Path) -> None:
     """Step responses by axis, from the flight log and, if there is one, from the blackbox.
 
     Args:
         by_source: the estimates, by source and by axis.
         path: the PNG file.
-        title: title of the figure.
     """
     notes = [
         "estimated from the flight. Told and marked: delay until 10 %, time until 63 % of the settled value; overshoot"
     ]
-    with figure(path, title, 4.3 + 0.2 * len(by_source), notes) as fig:
+    with figure(path, "Rate loop: response to a step", 4.3 + 0.2 * len(by_source), notes) as fig:
         axes = fig.subplots(1, 3, sharey=True)
         for i, (ax, axis) in enumerate(zip(axes, AXES, strict=True)):
             ax.axhline(1.0, color=GREY, linewidth=0.9)

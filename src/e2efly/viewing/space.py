@@ -169,17 +169,25 @@ def draw_flights(ax: Solid, flights: Flights, things: list[Thing], low: Corner, 
     ax.tick_params(pad=1)
 
 
-def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
-    ax.set_title("From above")
+def draw_flat(ax: Axes, things: list[Thing], axes: tuple[int, int]) -> None:
+    """Draw the objects of a task projected onto two of the world's axes."""
+    columns = list(axes)
     for thing in things:
         if isinstance(thing, Line):
-            ax.plot(*thing.points.T[:2], color=thing.color, linewidth=thing.width, zorder=2, solid_capstyle="butt")
+            points = thing.points[:, columns].T
+            ax.plot(*points, color=thing.color, linewidth=thing.width, zorder=2, solid_capstyle="butt")
         elif isinstance(thing, Face):
-            ax.add_patch(Polygon(thing.points[:, :2], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
+            ax.add_patch(Polygon(thing.points[:, columns], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
         elif thing.text:
-            ax.text(thing.point[0], thing.point[1], thing.text, **_TEXT)
+            x, y = thing.point[columns]
+            ax.text(x, y, thing.text, **_TEXT)
         else:
-            ax.plot(*thing.point[:2, None], marker=thing.marker, **MARK, zorder=5)
+            ax.plot(*thing.point[columns, None], marker=thing.marker, **MARK, zorder=5)
+
+
+def _plan(ax: Axes, flights: Flights, things: list[Thing], low: Corner, high: Corner, norm: Normalize) -> None:
+    ax.set_title("From above")
+    draw_flat(ax, things, (0, 1))
     segments, speeds = _paths(flights)
     lines = LineCollection(list(segments[..., :2]), array=speeds, cmap=SPEED, norm=norm, linewidths=1.4, zorder=3)
     lines.set_capstyle("round")

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
 
-from e2efly.config.drawing import INK, Face, Line, Thing
+from e2efly.config.drawing import Thing
+from e2efly.config.storage import make_folder
 from e2efly.control import COMMAND_MODES
 from e2efly.policy.runtime import Acting
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
@@ -20,6 +20,7 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.kept import PLACES, Pair
 from e2efly.viewing.objects import scene
+from e2efly.viewing.space import draw_flat
 from e2efly.viewing.style import BLUE, GREY, VERMILLION, figure
 
 _LOOKS: tuple[dict[str, Any], ...] = (
@@ -84,20 +85,10 @@ def plot_overlay(task: Any, flown: Mapping[str, Flights], path: str | Path, titl
 
 def _space(ax: Axes, places: list, things: list[Thing], axes: tuple[int, int]) -> None:
     """Draw all flights projected onto two of the world's axes, over the objects of the task."""
-    columns = list(axes)
-    for thing in things:
-        if isinstance(thing, Line):
-            ax.plot(*thing.points[:, columns].T, color=thing.color, linewidth=thing.width, zorder=1.5)
-        elif isinstance(thing, Face):
-            ax.add_patch(Polygon(thing.points[:, columns], facecolor=thing.color, edgecolor=thing.color, linewidth=2.5))
-        elif thing.text:
-            x, y = thing.point[columns]
-            ax.text(x, y, thing.text, color=INK, ha="center", va="center", weight="bold")
-        else:
-            ax.plot(*thing.point[columns, None], marker=thing.marker, color=INK, markersize=11, linestyle="")
+    draw_flat(ax, things, axes)
     for (_, flights), look in places:
         for i, length in enumerate(flights.length):
-            track = flights.position[:length, i][:, columns]
+            track = flights.position[:length, i][:, axes]
             ax.plot(*track.T, **look)
             if length and not flights.success[i]:
                 ax.plot(*track[-1, :, None], color=look["color"], zorder=7, **_FAILED)
@@ -142,10 +133,7 @@ def plot_validation(found: Validation, pairs: Mapping[str, Pair], folder: Path) 
     Raises:
         OSError: when the folder cannot be created.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make the folder of the plots {folder}: {error.strerror}") from error
+    make_folder(folder, "the folder of the plots")
     plant, vehicle = found.plant.name, found.candidate.policy.contract.vehicle
     for name, suite in found.candidate.task.criteria().items():
         flown = dict(zip(("training simulator", plant), pairs[name].flown.values(), strict=True))

@@ -15,7 +15,7 @@ from e2efly.courses.solids import CLASSES, SIZES
 from e2efly.environment import random_key
 from e2efly.simulation.scenes.file import load_scene
 from e2efly.simulation.scenes.generate import clutter, corridor, forest, room
-from e2efly.simulation.scenes.scene import Scene, Solids, approach, clearance, distances
+from e2efly.simulation.scenes.scene import Scene, Solids, clearance, distances
 from e2efly.simulation.scenes.shapes import FAR
 
 
@@ -76,13 +76,6 @@ class TestMoving:
         still = scene.at(quarter)
         for time in (NOW, quarter):
             np.testing.assert_allclose(still.solids["sphere"].position(time)[0, 0], [4.0, 1.0, 2.0], atol=1e-6)
-
-    def test_approach_counts_both_motions(self) -> None:
-        scene, p, v, time = self.moving(), at(4.0, 2.0, 2.0), at(0.3, -1.0, 0.2), jnp.full(1, 0.2)
-        gap, closing = approach(scene, p, v, time)
-        later, earlier = (clearance(scene, p + s * 1e-3 * v, time + s * 1e-3) for s in (1, -1))
-        np.testing.assert_allclose(gap, clearance(scene, p, time))
-        np.testing.assert_allclose(closing, -(later - earlier) / 2e-3, rtol=1e-3)
 
 
 class TestGenerators:
@@ -161,7 +154,7 @@ class TestFile:
         file = tmp_path / "scene.toml"
         file.write_text(GOOD)
         scene = load_scene(file, 3)
-        assert scene.worlds == 3 and scene.capacity == 3 and scene.kinds == ("cylinder", "pad")
+        assert scene.worlds == 3 and scene.kinds == ("cylinder", "pad")
         columns = scene.solids["cylinder"]
         np.testing.assert_allclose(scene.ground, 0.5)
         np.testing.assert_allclose(columns.size[2, :, :2], [[0.2, 1.0], [0.3, 1.0]])
@@ -173,7 +166,7 @@ class TestFile:
     def test_an_empty_file_is_level_ground(self, tmp_path: Path) -> None:
         (tmp_path / "scene.toml").write_text("")
         scene = load_scene(tmp_path / "scene.toml")
-        assert scene.capacity == 0 and float(scene.ground[0]) == 0.0
+        assert not scene.solids and float(scene.ground[0]) == 0.0
         (tmp_path / "scene.toml").write_text("ground = false")
         assert float(load_scene(tmp_path / "scene.toml").ground[0]) == -FAR
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from docs.noise_plots import allan_deviation
 
 from e2efly.config import ImuConfig
 from e2efly.environment import random_key
@@ -13,7 +14,6 @@ from e2efly.simulation.physics import State, rotation
 from e2efly.simulation.sensors import imu
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.viewing.noise_plots import allan_deviation
 
 DT = 1 / 30
 SILENT = ImuConfig(gyro_noise=0.0, gyro_bias=0.0, accel_noise=0.0, accel_bias=0.0)

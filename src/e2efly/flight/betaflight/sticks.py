@@ -105,19 +105,6 @@ class Sticks:
             channels[index] = int(mapped[function])
         return (*channels, *map(int, values[4:]))
 
-    def received(self, channels: Sequence[int]) -> tuple[int, ...]:
-        """What `messages.Rc` reports if the controller has received these channels and the map is right, µs."""
-        return (*(channels[index] for index in self.channel), *channels[_MAPPED:])
-
-    def command_of(self, channels: Sequence[int]) -> tuple[float, tuple[float, float, float]]:
-        """The throttle, 0 to 1, and the body rates, FLU, rad/s, that some channels command.
-
-        The channels are in the receiver's order.
-        """
-        pulses = [channels[index] for index in self.channel[:4]]
-        roll, pitch, yaw = (self._rate(axis, pulses[axis]) for axis in range(3))
-        return self.throttle.throttle_of(pulses[_THROTTLE]), (roll, pitch, yaw)
-
     def _rate(self, axis: int, pulse: int) -> float:
         stick = channel_to_stick(pulse, self.centre, self.deadband[axis])
         return stick_to_rate(self.rates, axis, stick * _SIGNS[axis])

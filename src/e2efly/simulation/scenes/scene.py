@@ -132,11 +132,6 @@ class Scene:
         """Number of worlds."""
         return self.ground.shape[0]
 
-    @property
-    def capacity(self) -> int:
-        """Number of solids for which a world has space."""
-        return sum(s.count for s in self.solids.values())
-
     def at(self, time: Float[Array, " n"]) -> "Scene":
         """The worlds at `time`, s, standing still."""
 
@@ -172,12 +167,3 @@ def distances(
     """Signed distance of a point in each world to each solid, m. `FAR` for solids that are not present."""
     local = unrotate(solids.quaternion, position[:, None] - solids.position(time))
     return jnp.where(solids.active, SHAPES[kind].distance(solids.size, local), FAR)
-
-
-def approach(
-    scene: Scene, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"], time: Float[Array, " n"]
-) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Clearance, m, and its rate of decrease, m/s, from the motion of the point and of the solids."""
-    still = jnp.ones_like(time)
-    gap, growing = jax.jvp(lambda p, t: clearance(scene, p, t), (position, time), (velocity, still))
-    return gap, -growing

@@ -15,7 +15,7 @@ from e2efly.simulation.scenes.generate import forest
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, AvoidMemory
 from e2efly.tasks.avoid.pilot import best_heading
-from e2efly.tasks.task import at_rest, struck, uniform
+from e2efly.tasks.task import at_rest, between, struck, uniform
 
 STRICT = 1.5
 """Vertical speed of the expert divided by its height error, 1/s."""
@@ -39,8 +39,7 @@ class Avoid(AvoidGoal):
         trees_key, state_key = jax.random.split(key)
         c, u, zero = self.config, uniform(state_key, n, 5), jnp.zeros(n)
         state = at_rest(jnp.stack([zero, c.sideways * u[:, 0], c.altitude + 0.3 * u[:, 1]], axis=-1))
-        low, high = c.speed
-        speed = (low + high) / 2 + (high - low) / 2 * u[:, 2]
+        speed = between(c.speed, u[:, 2])
         end = jnp.stack([zero + c.forest.length, zero, zero], axis=-1)
         trees = forest(trees_key, n, c.forest, state.position, end)
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), AvoidWorld(speed, trees)

@@ -15,7 +15,7 @@ from e2efly.simulation.scenes.scene import WALL, Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.gap.goal import WALL_WIDTH, GapGoal, GapMemory, rims
-from e2efly.tasks.task import at_rest, uniform
+from e2efly.tasks.task import at_rest, between, uniform
 
 START_YAW = 0.3
 """Largest heading angle at the start, to either side, rad."""
@@ -54,9 +54,9 @@ class Gap(GapGoal):
         """At rest in front of the wall, roughly facing it. The slit is anywhere ahead, tilted to the left or right."""
         c, u, zero = self.config, uniform(key, n, 7), jnp.zeros(n)
         state = at_rest(jnp.stack([zero, zero, zero + c.altitude], axis=-1))
-        ahead = _within(c.distance, u[:, 0])
+        ahead = between(c.distance, u[:, 0])
         centre = jnp.stack([ahead, c.sideways * u[:, 1], c.altitude + c.sideways * u[:, 2]], axis=-1)
-        roll = jnp.where(u[:, 3] < 0, -1.0, 1.0) * _within(c.roll, u[:, 4])
+        roll = jnp.where(u[:, 3] < 0, -1.0, 1.0) * between(c.roll, u[:, 4])
         memory = GapMemory(centre, from_euler(roll, zero, c.yaw * u[:, 5]), jnp.zeros(n, bool))
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, START_YAW * u[:, 6])), memory
 
@@ -101,9 +101,3 @@ class Gap(GapGoal):
         moved, outcome = super().advance(memory, before, after, time, timed_out)
         signals = {"roll_error": self.roll_error(memory, after), "overhang": self.overhang(memory, after)}
         return moved, dataclasses.replace(outcome, signals=outcome.signals | signals)
-
-
-def _within(bounds: tuple[float, float], u: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Map u in [-1, 1] to a value between the bounds."""
-    low, high = bounds
-    return (low + high) / 2 + (high - low) / 2 * u

@@ -28,6 +28,14 @@ class Landing(Goal):
 
     lands: ClassVar = True
 
+    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
+        """Goal minus position."""
+        return self.goal(memory, time) - body.position
+
+    def desired_yaw(self, memory: Any, state: Any) -> Array:
+        """Along world x."""
+        return namespace(state.position).zeros_like(state.position[:, 0])
+
     def done(self, outcome: Outcome) -> bool:
         """Done at the first touch, good or bad. A vehicle that has touched the ground must not climb again."""
         return bool(outcome.signals["touched"][0])
@@ -49,16 +57,12 @@ class LandGoal(Landing):
         zero = 0.0 * time
         return namespace(time).stack([zero, zero, zero + self.shape.feet_height], axis=-1)
 
-    def position_error(self, memory: Array, time: Array, body: Any) -> Array:
-        """Goal minus position."""
-        return self.goal(memory, time) - body.position
-
     observation = (
         (
             Field(
                 "position_error", 3, "world", "m", 1.0, "where the centre of mass is after landing, minus where it is"
             ),
-            position_error,
+            Landing.position_error,
         ),
     )
 
@@ -112,6 +116,8 @@ class LandRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the pad, which is the origin of the task's world."""
-        start = np.array([0.6, 0.4, defaults.FLOWN_HEIGHT])
-        goal, pad = LandGoal(LandConfig(), shape), Origin(self.pad)
-        return Course(goal, np.zeros((1, 0)), start, points=np.zeros(3), clearance=-math.inf, origin=pad)
+        start, pad = np.array([0.6, 0.4, defaults.FLOWN_HEIGHT]), Origin(self.pad)
+        return Course(self._goal(shape), np.zeros((1, 0)), start, points=np.zeros(3), clearance=-math.inf, origin=pad)
+
+    def _goal(self, shape: Shape) -> Goal:
+        return LandGoal(LandConfig(), shape)

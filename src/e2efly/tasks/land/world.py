@@ -36,7 +36,3 @@ class Land(LandGoal):
         return Scene.of(
             {"pad": Solids.of("pad", jnp.zeros((n, 1, 3)), jnp.array([2 * self.config.radius, 0.002, DISC]))}, n
         )
-
-    def desired_yaw(self, memory: Float[Array, "n 0"], state: State) -> Float[Array, " n"]:
-        """Along world x."""
-        return jnp.zeros_like(state.position[:, 0])

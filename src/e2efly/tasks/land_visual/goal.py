@@ -1,15 +1,12 @@
 """Visual landing: the goal, and the route of a flight. Imports no JAX."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from e2efly.control.vectors import Array, namespace
-from e2efly.courses import defaults
-from e2efly.courses.origin import Origin
-from e2efly.policy.goal import Course, Outcome, Shape
+from e2efly.policy.goal import Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.land.goal import Landing, LandRoute, touchdown
 from e2efly.tasks.land_visual import LandVisualConfig
@@ -38,15 +35,11 @@ class LandVisualGoal(Landing):
         """Height of the feet above the ground."""
         return body.position[:, 2:] - self.shape.feet_height
 
-    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
-        """Goal minus position."""
-        return self.goal(memory, time) - body.position
-
     observation = (
         (Field("height", 1, "none", "m", 1.0, "height of the feet over the ground"), height),
         (
             Field("position_error", 3, "world", "m", 1.0, "where the centre of mass is on the pad, minus where it is"),
-            position_error,
+            Landing.position_error,
         ),
     )
 
@@ -68,8 +61,5 @@ class LandVisualGoal(Landing):
 class LandVisualRoute(LandRoute):
     """Where the pad is: the point on the ground under it."""
 
-    def course(self, shape: Shape, control_period: float) -> Course:
-        """The course to the pad, which is the origin of the task's world."""
-        start = np.array([0.6, 0.4, defaults.FLOWN_HEIGHT])
-        goal, pad = LandVisualGoal(LandVisualConfig(), shape), Origin(self.pad)
-        return Course(goal, np.zeros((1, 0)), start, points=np.zeros(3), clearance=-math.inf, origin=pad)
+    def _goal(self, shape: Shape) -> Goal:
+        return LandVisualGoal(LandVisualConfig(), shape)

@@ -46,10 +46,6 @@ class LandVisual(LandVisualGoal):
         """The pad: its outline (0: disc, 1: square, 2: triangle) and its width, m."""
         return {"pad_outline": memory.size[:, 0, 2].astype(int), "pad_width_m": 2 * memory.size[:, 0, 0]}
 
-    def desired_yaw(self, memory: Solids, state: State) -> Float[Array, " n"]:
-        """Along world x."""
-        return jnp.zeros_like(state.position[:, 0])
-
     def advance(
         self, memory: Solids, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[Solids, Outcome]:

@@ -143,9 +143,3 @@ def displaced(key: PRNGKeyArray, n: int, given: Tracks, moved: Any, turned: Any,
         sin=g.sin * cos + g.cos * sin,
     )
     return dataclasses.replace(tracks, gates=gates)
-
-
-def between(ends: tuple[Any, Any], u: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Uniform numbers in [-1, 1] as uniform numbers between two ends."""
-    low, high = ends
-    return (low + high) / 2 + (high - low) / 2 * u

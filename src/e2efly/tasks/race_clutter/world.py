@@ -17,10 +17,10 @@ from e2efly.simulation.scenes.generate import clutter
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.race.any_goal import Ahead, AnyRaceMemory, towards
-from e2efly.tasks.race.any_world import between, displaced, several
+from e2efly.tasks.race.any_world import displaced, several
 from e2efly.tasks.race_clutter import RaceClutterConfig
 from e2efly.tasks.race_clutter.goal import RaceClutterGoal
-from e2efly.tasks.task import at_rest, into_ball, struck, uniform
+from e2efly.tasks.task import at_rest, between, into_ball, struck, uniform
 
 APPROACH = 0.7
 """Distance of two points in front of and behind each gate that obstacles also keep clear of, m."""

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from e2efly.config.drawing import Face
+from e2efly.control import Quat, Vec3
 from e2efly.simulation.scenes.faces import Quads, box, cylinder
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -128,9 +129,7 @@ def _bar(start: np.ndarray, end: np.ndarray, thick: float) -> Quads:
 
 def turned(quaternion: Float[np.ndarray, "*n 4"], vector: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Vectors of the body frame in world axes. The quaternions are unit quaternions, wxyz."""
-    w, axis = quaternion[..., :1], quaternion[..., 1:]
-    across = 2 * np.cross(axis, vector)
-    return vector + w * across + np.cross(axis, across)
+    return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
 
 
 def spun(

@@ -6,11 +6,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from docs.vehicle_drawing import ABOVE, Mounted, drawing
 
 from e2efly.alignment.parts import read_parts
 from e2efly.vehicles.loading import _HERE, load_vehicle
 from e2efly.vehicles.vehicle import allocation_matrix
-from e2efly.viewing.vehicle_drawing import ABOVE, Mounted, drawing
 
 SVG = "{http://www.w3.org/2000/svg}"
 AHEAD = Mounted("camera ahead: RealSense D435i", -0.35, (1.52, 1.01), "a task sees")
