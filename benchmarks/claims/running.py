@@ -106,10 +106,12 @@ def place(run: Run, seed: int, how: How) -> Path:
 
 
 def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
-    """The figures of a training, which goes on where its folder has one that was stopped or killed."""
-    summary = out / "summary.json"
-    told = json.loads(summary.read_text()) if summary.exists() else {"finished": False, "env_steps": 0}
-    if not told["finished"] and not enough(points(out), how):
+    """The figures of a training, which goes on where its folder has one that was stopped or killed. One that was killed
+    has no summary: it goes on for an evaluation at least.
+    """
+    summary, before = out / "summary.json", len(points(out))
+    told = json.loads(summary.read_text()) if summary.exists() else None
+    if told is None or not (told["finished"] or enough(points(out), how)):
         if (out / "checkpoint.safetensors").exists():
             options = ["--resume", str(out)]
         else:
@@ -117,7 +119,12 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
             options = [run.task, "--algo", run.algo, "--seed", str(seed), "--out", str(out), *run.options, *short]
         limited = not math.isinf(how.most) or how.stop is not None
         command = ["train", *options, "--no-plots", "--device", how.device]
-        process(command, out.with_suffix(".time"), lambda: limited and enough(points(out), how))
+
+        def over() -> bool:
+            known = points(out)
+            return limited and len(known) > before and enough(known, how)
+
+        process(command, out.with_suffix(".time"), over)
     return figures(out)
 
 
