@@ -13,7 +13,6 @@ vehicle leaves it. The fastest race is that of the highest speed of `SPEEDS` at 
 
 import dataclasses
 import json
-import math
 import time
 from argparse import Namespace
 from typing import Any
@@ -23,6 +22,7 @@ from common import RESULTS, arguments, table, with_earlier, write
 from rich.console import Console
 
 from e2efly.commands.rehearsals import fly_whole
+from e2efly.config.storage import finite
 from e2efly.flight.settings import Fence
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import route_of
@@ -54,8 +54,7 @@ IN_ROOM: dict[str, tuple[str, dict[str, Any]]] = {
 
 def flight_row(flight: Rehearsal) -> dict[str, Any]:
     """A flight as JSON, without its track. Missing values are null."""
-    row = {f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"}
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
+    return finite({f.name: getattr(flight, f.name) for f in dataclasses.fields(flight) if f.name != "flown"})
 
 
 def main() -> None:

@@ -109,9 +109,9 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
     """The figures of a training, which goes on where its folder has one that was stopped or killed. One that was killed
     has no summary: it goes on for an evaluation at least.
     """
-    summary, before = out / "summary.json", len(points(out))
+    summary, before = out / "summary.json", points(out)
     told = json.loads(summary.read_text()) if summary.exists() else None
-    if told is None or not (told["finished"] or enough(points(out), how)):
+    if told is None or not (told["finished"] or enough(before, how)):
         if (out / "checkpoint.safetensors").exists():
             options = ["--resume", str(out)]
         else:
@@ -122,7 +122,7 @@ def trained(run: Run, seed: int, out: Path, how: How) -> dict[str, Any]:
 
         def over() -> bool:
             known = points(out)
-            return limited and len(known) > before and enough(known, how)
+            return limited and len(known) > len(before) and enough(known, how)
 
         process(command, out.with_suffix(".time"), over)
     return figures(out)

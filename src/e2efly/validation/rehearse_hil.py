@@ -192,9 +192,8 @@ def unlike(lap: Lap) -> list[str]:
     after = [change for change in lap.changes if change.time > lap.window[0]]
     if not after:
         return [*found, f"after the kill the bridge changed no mode; documented: {wanted or 'any'}, {reason}"]
-    told = [change for change in after if any(text.startswith(reason) for text in change.reasons)]
-    first = wanted == "" or (after[0].mode == wanted and after[:1] == told[:1])
-    if not told or not first:
+    told = [text for change in (after[:1] if wanted else after) for text in change.reasons]
+    if wanted not in ("", after[0].mode) or not any(text.startswith(reason) for text in told):
         said = f"{after[0].mode} ({'; '.join(after[0].reasons)})"
         found.append(f"after the kill came {said}; documented: {wanted or 'any mode'} ({reason})")
     return found
