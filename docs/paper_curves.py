@@ -104,10 +104,11 @@ def ablation(runs: Sequence[Run], algo: str) -> Path | None:
             steps = numbers(one["curve"]["steps"]) / 1e6
             for name, told in zip(one["variants"], one["curve"]["error" if by_error else "success"], strict=True):
                 full = name == "full"
-                colour = INK if full else CYCLE[parts.index(name) % len(CYCLE)]
+                turn, place = (0, 0) if full else divmod(parts.index(name), len(CYCLE))
+                look: Any = {"color": INK if full else CYCLE[place], "linestyle": ("-", "--", ":")[turn]}
                 label = "r full" if full else f"w/o r {name}"
                 values = numbers(told) * (1 if by_error else 100)
-                ax.plot(steps, values, color=colour, linewidth=2.2 if full else 1.4, label=label)
+                ax.plot(steps, values, **look, linewidth=2.2 if full else 1.4, label=label)
             ax.set_title(f"{TASKS[one['task']]}, {one['variant']}", fontsize=9)
             if by_error:
                 ax.set(yscale="log", ylabel="error (m)")
