@@ -83,7 +83,9 @@ def noiseless(tasks: tuple[str, ...], fly: bool) -> Any:
 
 
 def depth_helps(found: Found) -> list[Case]:
-    """Whether noise of inverse depth in training leaves more success in the worst noise, and a policy that flies."""
+    """Whether noise of inverse depth in training leaves more success in the worst noise, by more than what counts as
+    lost, and a policy that flies.
+    """
     out = []
     plain = left(found, "avoid", CLEAN)
     for sigma in SIGMAS:
@@ -91,7 +93,7 @@ def depth_helps(found: Found) -> list[Case]:
         if both := sorted(set(plain) & set(noisy)):
             worst = min(both, key=lambda name: plain[name])
             without, given = plain[worst], min(noisy[name] for name in both)
-            right = given > without and given > FLIES - LOST
+            right = given > without + LOST and given > FLIES - LOST
             sides = tuple(Side(found.of(task="avoid", variant=variant)) for variant in (CLEAN, deep(sigma)))
             learns = all(flies(found, CLEAN, task="avoid", variant=variant) for variant in (CLEAN, deep(sigma)))
             told = f"{100 * without:.1f} % {worst} without, {100 * given:.1f} % with"
@@ -117,7 +119,7 @@ NOISE = Experiment(
         Claim("Tasks by sight need noise in training", "no figure", noiseless(("land_visual", "avoid"), fly=False), 2,
               NUMBERS, "success, trained without noise; flown with the worst and with none"),
         Claim("Noise of inverse depth in training narrows the gap", "no figure", depth_helps, 1, NUMBERS,
-              "success in the noise that is the worst without it, and with it in its worst"),
+              "success in the noise that is the worst without it, and with it in its worst; narrower: 5 points more"),
     ),
     (
         *(
