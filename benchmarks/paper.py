@@ -49,12 +49,13 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def joined(known: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """All runs of two files; of a run that both have, that of the other file, and its machine and day."""
+    """All runs of two files; of one that both have, that of the other file. Machine and day are the newest."""
     out = {}
     for name, own in known.items():
         anew = {key(one) for one in other[name]["runs"]}
         kept = [one for one in own["runs"] if key(one) not in anew]
-        out[name] = {**(other[name] if anew else own), "runs": [*kept, *other[name]["runs"]]}
+        newest = max(own, other[name], key=lambda part: part["date"] or "")
+        out[name] = {**newest, "runs": [*kept, *other[name]["runs"]]}
     return out
 
 
