@@ -213,3 +213,19 @@ def test_the_first_process_hands_signals_on(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.wait()
+
+
+def test_the_first_process_hands_a_signal_on_that_comes_as_the_command_starts() -> None:
+    """`docker stop` may come at any time. The command gets the signal, and its end by it is the status."""
+    code = """if True:
+        import os, signal, subprocess, sys
+        from e2efly.flight.scripts.first import main
+
+        class Asked(subprocess.Popen):
+            def __init__(self, command):
+                super().__init__(command)
+                os.kill(os.getpid(), signal.SIGTERM)
+
+        subprocess.Popen = Asked
+        sys.exit(main(["sleep", "30"]))"""
+    assert subprocess.run([sys.executable, "-c", code], timeout=25).returncode == 143

@@ -24,14 +24,21 @@ def main(command: list[str]) -> int:
     """Run a command until it and all processes that it leaves behind have ended. Returns its exit status."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(ADOPT, 1, 0, 0, 0)
-    process = subprocess.Popen(command)
+    process = None
+    early: list[int] = []  # a signal that comes before the command runs is for the command, too
 
     def hand_on(number: int, _: Any) -> None:
+        if process is None:
+            early.append(number)
+            return
         with suppress(ProcessLookupError):
             os.kill(process.pid, number)
 
     for number in HANDED_ON:
         signal.signal(number, hand_on)
+    process = subprocess.Popen(command)
+    for number in early:
+        hand_on(number, None)
     status = 0
     while True:
         try:
