@@ -176,7 +176,7 @@ def measure(experiment: Experiment, options: argparse.Namespace, how: How) -> No
         own = known[experiment.name]
         if not options.again and not wanted(run, seed, seeds, own["runs"], how):
             continue
-        told = {**make(run, seed, seeds, how), "date": today()}
+        told = {**make(run, seed, seeds, how), "date": today(), "cpu": machine()["cpu"]}
         known = read(options.json)  # another process may have written meanwhile
         own = known[experiment.name]
         runs = [one for one in own["runs"] if key(one) != key(told)]

@@ -241,9 +241,11 @@ def measured(name: str, part: dict[str, Any]) -> str:
     m = part["machine"]
     cores = sorted({one["cores"] for one in part["runs"] if "cores" in one})
     of = f"{' or '.join(map(str, cores))} of {m['cores']}" if cores else m["cores"]
-    earliest = min(one["date"] for one in part["runs"])
-    since = f" Runs of {earliest} and later; this is the machine of the newest." if earliest < part["date"] else ""
-    return f"`benchmarks/paper.py {name}`, {part['date']}, {of} cores of {m['cpu']}, JAX {m['jax']}.{since}"
+    days: dict[str, set[str]] = {}
+    for one in part["runs"]:
+        days.setdefault(one["cpu"], set()).add(one["date"])
+    where = "; ".join(f"{' and '.join(sorted(own))} on {cpu}" for cpu, own in sorted(days.items()))
+    return f"`benchmarks/paper.py {name}`, {of} cores, {where}; JAX {m['jax']}."
 
 
 def main() -> None:
