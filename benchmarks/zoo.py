@@ -89,6 +89,11 @@ def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
     return {row: min(found["success"] for found in criteria.values()) for row, criteria in rows.items()}
 
 
+def starts(task: str) -> tuple[str, ...]:
+    """The option for the number of starts per row."""
+    return ("--episodes", str(SEEN)) if task in TASKS and TASKS[task].cameras else ()
+
+
 def recipe(vehicle: str, task: str) -> tuple[str, str]:
     """The task that a policy is of, and the preset by which it is learned; empty: the one that `train` takes."""
     kind, own = VARIANTS.get(task, (task, ""))
@@ -122,8 +127,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
         if TASKS[task].cameras:
             more |= {"mean_speed_m_s": {name: suite["mean_speed_m_s"] for name, suite in suites.items()}}
-        fewer = ("--episodes", str(SEEN)) if TASKS[task].cameras else ()
-        more |= {"stress": stressed(out / "policy.onnx", folder, *fewer)}
+        more |= {"stress": stressed(out / "policy.onnx", folder, *starts(task))}
     return reported, {
         "algorithm": summary["algorithm"],
         "seed": summary["seed"],
@@ -245,9 +249,9 @@ def main() -> None:
             about = zoo[vehicle].get(task, {})
             if about.get("preset") == "robust" and vehicle not in family_names():
                 with tempfile.TemporaryDirectory() as folder:
-                    about["stress"] = stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder))
+                    about["stress"] = stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder), *starts(task))
+                write(contents() | {vehicle: contents()[vehicle] | {task: about}})
                 print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}", flush=True)
-        write(zoo)
         return
     rows = []
     for out in map(Path, options.runs):
