@@ -19,8 +19,10 @@ from e2efly.config.env import (
     CameraConfig,
     DisturbanceConfig,
     EnvConfig,
+    EstimateConfig,
     ImageNoiseConfig,
     ImuConfig,
+    LinkConfig,
     NoiseConfig,
 )
 from e2efly.config.numbers import check_fields, number, shape
@@ -48,10 +50,12 @@ __all__ = [
     "ClutterConfig",
     "DisturbanceConfig",
     "EnvConfig",
+    "EstimateConfig",
     "FOPPOConfig",
     "ForestConfig",
     "ImageNoiseConfig",
     "ImuConfig",
+    "LinkConfig",
     "NetworkConfig",
     "NoiseConfig",
     "PPOConfig",

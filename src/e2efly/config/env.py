@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from e2efly.config.numbers import ANGLE, BODY_RATE, LATEST, SPEED, number
+from e2efly.config.numbers import ANGLE, BODY_RATE, LATEST, SPEED, number, shape
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,48 @@ class DisturbanceConfig:
     def weakest(self) -> float:
         """The smallest share of the nominal thrust with which an episode can end."""
         return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag)
+
+
+@dataclass(frozen=True)
+class EstimateConfig:
+    """Errors of a state estimate, which white noise does not describe.
+
+    Each number is the largest one: half of the episodes do not have the effect, and each of the others draws its own
+    strength between zero and this.
+    """
+
+    position_lag: float = number(0.0, high=1.0)
+    """Time constant of the low-pass of the observed position, s."""
+    velocity_lag: float = number(0.0, high=1.0)
+    """Time constant of the low-pass of the observed velocity, s."""
+    attitude_lag: float = number(0.0, high=1.0)
+    """Time constant of the low-pass of the observed attitude, s."""
+    body_rate_lag: float = number(0.0, high=1.0)
+    """Time constant of the low-pass of the observed body rates, s."""
+    yaw: float = number(0.0, high=ANGLE)
+    """Constant error of the observed heading, rad, to either side."""
+    tilt: float = number(0.0, high=ANGLE)
+    """Constant error of the observed attitude about a horizontal axis of the body, rad."""
+    jump: float = number(0.0, high=100.0)
+    """Error of the observed position while poses are wrong, m in a random direction. That is the case about every four
+    seconds, for 0.2 s on average."""
+    hold: float = number(0.0, high=100.0)
+    """How often in succession a pose is repeated, control steps: each pose between not at all and so often, while the
+    body rates go on."""
+
+
+@dataclass(frozen=True)
+class LinkConfig:
+    """Commands that do not reach the flight controller, which goes on with the last one.
+
+    Each number is the largest one: half of the episodes do not have the effect, and each of the others draws its own
+    strength between zero and this.
+    """
+
+    dropped: float = number(0.0, high=0.9)
+    """Share of the control steps whose command is lost."""
+    silence: float = number(0.0, high=10.0)
+    """How long all commands are lost, s, once in every three seconds."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +239,10 @@ class EnvConfig:
     """Gusts, uneven rotors, a sagging battery, an offset of the centre of mass, and drifting poses."""
     noise: NoiseConfig = NoiseConfig()
     """Noise of the observed state."""
+    estimate: EstimateConfig = shape(EstimateConfig(), added=True)
+    """Late, turned, jumping and repeated poses."""
+    link: LinkConfig = shape(LinkConfig(), added=True)
+    """Lost commands."""
     imu: ImuConfig = ImuConfig()
     """The IMU."""
     cameras: tuple[CameraConfig, ...] = ()

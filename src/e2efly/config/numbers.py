@@ -48,6 +48,7 @@ def number(
     high: float = math.inf,
     rising: bool = False,
     endless: bool = False,
+    added: bool = False,
 ) -> Any:
     """A field of one or several numbers, with its default and its rule.
 
@@ -60,12 +61,13 @@ def number(
         high: largest accepted value.
         rising: whether there are two numbers, the smaller one first.
         endless: whether infinity is accepted, too.
+        added: as for `shape`.
     """
     whole = _is_whole(default)
     largest = MOST if whole else LARGEST
     least = low if above is None else above + (1 if whole else SMALLEST)
     rule = Rule(max(least, -largest), high if high < math.inf else largest, rising, endless)
-    return dataclasses.field(default=default, metadata={RULE: rule})
+    return dataclasses.field(default=default, metadata={RULE: rule, ADDED: added})
 
 
 def shape(default: Any, *, added: bool = False) -> Any:

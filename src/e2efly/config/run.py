@@ -49,7 +49,9 @@ class NetworkConfig:
 
 @dataclass(frozen=True)
 class StageConfig:
-    """A stage of a curriculum: the task with a few numbers changed, until it is mastered or its time is over."""
+    """A stage of a curriculum: the task with a few numbers changed, or less of what is drawn, until it is mastered or its
+    time is over.
+    """
 
     changes: dict[str, float | tuple[float, ...]]
     """New values of the task's fields, by dotted path: {"forest.density": 0.0}. Fields that set shapes or the program
@@ -58,6 +60,8 @@ class StageConfig:
     """Promotion: the success rate in an evaluation at which this stage ends."""
     steps: int | None = number(None, low=1, high=10**15)
     """Promotion at the latest after so many environment steps."""
+    strength: float = number(1.0, high=1.0, added=True)
+    """Share of everything that the environment draws: vehicles, delays, air, poses and links."""
 
 
 VISFLY = "SJTU-ViSYS-team/VisFly at 6ff29bf"
@@ -116,6 +120,8 @@ class Robust:
     """Units of the hidden layers."""
     start_from: str | None = None
     """The policy of the zoo whose weights the training starts from. None: fresh weights, or as the recipe says."""
+    eased: tuple[float, int] | None = None
+    """A first stage: its `StageConfig.strength`, and its environment steps. None: there is none."""
 
     def into(self, config: "TrainConfig") -> "TrainConfig":
         """A configuration that learns in this way."""
@@ -128,6 +134,9 @@ class Robust:
             if self.weights is None
             else RewardConfig(dict(self.weights), {**given, **self.parameters}),
             start_from=self.start_from or config.start_from,
+            curriculum=config.curriculum
+            if self.eased is None
+            else (StageConfig({}, strength=self.eased[0], steps=self.eased[1]), *config.curriculum),
             steps=self.steps,
             chunk=self.chunk,
         )

@@ -1,5 +1,6 @@
 """Values that are drawn for each episode of a batch."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -17,6 +18,11 @@ jax.tree_util.register_dataclass(Posterior, data_fields=["root"], meta_fields=["
 def between(key: PRNGKeyArray, n: int, bounds: Float[Array | np.ndarray, "2"]) -> Float[Array, " n"]:
     """Uniform random numbers between two bounds."""
     return bounds[0] + (bounds[1] - bounds[0]) * jax.random.uniform(key, (n,), jnp.asarray(bounds).dtype)
+
+
+def sometimes(key: PRNGKeyArray, n: int, largest: Sequence[Any]) -> Float[Array, "n k"]:
+    """Strengths of effects that half of the episodes do not have: 0, or uniform between 0 and the largest."""
+    return jnp.asarray(largest) * jnp.maximum(uniform(key, n, len(largest)), 0.0)
 
 
 def perturbed(key: PRNGKeyArray, n: int, nominal: Vehicle, widths: dict[str, Any], flown: Vehicle) -> dict[str, Array]:

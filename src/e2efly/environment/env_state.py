@@ -8,11 +8,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.environment.disturbance import Disturbance
+from e2efly.environment.lost_commands import LostCommands
+from e2efly.environment.pose_errors import PoseErrors
 from e2efly.simulation.physics import State
 from e2efly.simulation.sensors import imu
 from e2efly.simulation.sensors.eyes import Eye
 
-STARTS, INERTIAL, SEEN, IMAGES, DISTURBED = range(5)
+STARTS, INERTIAL, SEEN, IMAGES, DISTURBED, ESTIMATED, SENT = range(7)
 """The random parts of a control step. Each has its own keys."""
 
 
@@ -38,6 +40,10 @@ class EnvState:
     """The uniform random numbers that define each episode's vehicle, for a family."""
     disturbance: Disturbance | None
     """Gusts, rotors, sag and drift."""
+    estimate: PoseErrors | None
+    """The errors of the observed state."""
+    link: LostCommands | None
+    """The commands that are lost."""
     past: State | None
     """The last states, newest first, if observations are delayed."""
     observation_latency: Float[Array, " n"]

@@ -21,23 +21,36 @@ from e2efly.config import (
     CameraConfig,
     DisturbanceConfig,
     EnvConfig,
+    EstimateConfig,
     ImuConfig,
+    LinkConfig,
     NoiseConfig,
     RewardConfig,
     TaskConfig,
 )
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
-from e2efly.environment import disturbance, expert
+from e2efly.environment import disturbance, expert, lost_commands, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
-from e2efly.environment.env_state import DISTURBED, INERTIAL, SEEN, STARTS, EnvState, Step, pushed, where
+from e2efly.environment.env_state import (
+    DISTURBED,
+    ESTIMATED,
+    INERTIAL,
+    SEEN,
+    SENT,
+    STARTS,
+    EnvState,
+    Step,
+    pushed,
+    where,
+)
 from e2efly.environment.limits import latencies_of, limits_of, posterior_of
 from e2efly.environment.rules import check
 from e2efly.environment.signals import dangers, happened
 from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
-from e2efly.simulation.physics import Physics, started, step
+from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
 from e2efly.simulation.physics.rotation import unrotate
 from e2efly.simulation.scenes import scene as scenes
@@ -58,6 +71,12 @@ DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
 
+def _times(part: Any, strength: float) -> Any:
+    """The numbers of a configuration times a share, except the gusts' correlation time, which is no strength."""
+    scaled = {name: strength * value for name, value in vars(part).items() if name != "gust_time"}
+    return dataclasses.replace(part, **scaled)
+
+
 def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     """The checked task of a vehicle."""
     config.check(1 / physics.control_period, shape.feet_height)
@@ -68,7 +87,8 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "noise", "imu", "cameras",
+        "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "estimate", "link", "noise",
+        "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
 )  # fmt: skip
@@ -95,6 +115,8 @@ class Env:
     wind: Any
     """Largest wind speed, m/s; None: still air."""
     disturbance: DisturbanceConfig | None
+    estimate: EstimateConfig | None
+    link: LinkConfig | None
     noise: NoiseConfig | None
     imu: ImuConfig | None
     cameras: tuple[CameraConfig, ...]
@@ -167,6 +189,8 @@ class Env:
             posterior=posterior and dataclasses.replace(posterior, root=posterior.root.astype(dtype)),
             wind=config.wind or None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
+            estimate=None if config.estimate == EstimateConfig() else config.estimate,
+            link=None if config.link == LinkConfig() else config.link,
             noise=config.noise if noisy else None,
             imu=config.imu if config.imu.observed else None,
             cameras=config.cameras,
@@ -192,7 +216,8 @@ class Env:
         spread = sooner != later and self.family is None
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
-        return bool(spread or drawn or self.wind or (self.disturbance or DisturbanceConfig()) != DisturbanceConfig())
+        parts = (self.disturbance, DisturbanceConfig()), (self.estimate, EstimateConfig()), (self.link, LinkConfig())
+        return bool(spread or drawn or self.wind or any((part or none) != none for part, none in parts))
 
     @property
     def vehicles(self) -> str:
@@ -202,20 +227,26 @@ class Env:
         return FILE if self.family is None else STILL
 
     def undisturbed(self) -> "Env":
-        """The environment with the vehicle of the file, its delay, still air, and nominal cameras.
+        """The environment with the vehicle of the file, its delay, still air, exact poses, and nominal cameras.
 
         For a family, it has the family's vehicles and their delays. Only numbers differ, so the same compiled programs
         accept it.
         """
+        return dataclasses.replace(self.eased(0.0), cameras=tuple(map(steady, self.cameras)))
+
+    def eased(self, strength: float) -> "Env":
+        """The environment with a share of all that is drawn, except the cameras: only numbers differ."""
         nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
+        late = np.stack([nominal + strength * (x - nominal) for x in self.latency_range])
         return dataclasses.replace(
             self,
-            latency_range=np.stack([nominal, nominal]) if self.family is None else self.latency_range,
-            randomize={name: 0 * width for name, width in self.randomize.items()},
-            posterior=self.posterior and self.posterior.times(0.0),
-            wind=self.wind and 0 * self.wind,
-            disturbance=self.disturbance and DisturbanceConfig(),
-            cameras=tuple(map(steady, self.cameras)),
+            latency_range=late.astype(late[0].dtype) if self.family is None else self.latency_range,
+            randomize={name: strength * width for name, width in self.randomize.items()},
+            posterior=self.posterior and self.posterior.times(strength),
+            wind=self.wind and strength * self.wind,
+            disturbance=self.disturbance and _times(self.disturbance, strength),
+            estimate=self.estimate and _times(self.estimate, strength),
+            link=self.link and _times(self.link, strength),
         )
 
     @property
@@ -331,7 +362,9 @@ class Env:
         """One control step without new starts, with the images of the previous step."""
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
-        old, new, switch = latency.acting_commands(self.command(actions), state.action_latency, period)
+        linked = state.link and state.link.after(state.key_of(SENT), action, state.time)
+        arrived = actions if linked is None else linked.arrived
+        old, new, switch = latency.acting_commands(self.command(arrived), state.action_latency, period)
         before, physics = state.vehicle, self._physics(state.family)
         plant = dataclasses.replace(physics.flown, **state.plant)
         wind, share, disturbed = state.wind, None, state.disturbance
@@ -355,10 +388,14 @@ class Env:
             time=time,
             actions=actions,
             disturbance=disturbed,
+            link=linked,
             past=None if state.past is None else pushed(state.past, after),
             imu=inertial,
             tick=state.tick + 1,
         )
+        if state.estimate is not None:
+            found = state.estimate.after(state.key_of(ESTIMATED), self._measured(reached), period)
+            reached = dataclasses.replace(reached, estimate=found)
         signals = happened(self.task, state, reached, action, outcome)
         if self._reads("expert_action") and isinstance(self.task, Guided) and physics.command_mode == "ctbr":
             signals["expert_action"] = self.expert_action(state)
@@ -407,16 +444,20 @@ class Env:
         past = None
         if self.past:
             past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)
+        actions = jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype)
+        estimate_key, link_key = (jax.random.fold_in(observation_key, i) for i in (1, 2))
         return EnvState(
             vehicle=vehicle,
             memory=memory,
             time=jnp.zeros(n, dtype),
-            actions=jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype),
+            actions=actions,
             action_latency=late,
             plant=plant,
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
             family=family,
             disturbance=disturbed,
+            estimate=None if self.estimate is None else pose_errors.draw(self.estimate, estimate_key, vehicle),
+            link=None if self.link is None else lost_commands.draw(self.link, link_key, actions),
             past=past,
             observation_latency=between(observation_key, n, self.observation_latency_range),
             imu=None if self.imu is None else imu.ImuState.at(vehicle),
@@ -457,10 +498,16 @@ class Env:
         command = command.at[:, 0].multiply(needed)
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 
+    def _measured(self, state: EnvState) -> State:
+        """The state that is measured: the vehicle's, or an older one."""
+        if state.past is None:
+            return state.vehicle
+        return latency.delayed_state(state.past, state.observation_latency, self.control_period)
+
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
-        seen = state.vehicle
-        if state.past is not None:
-            seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
+        seen = self._measured(state)
+        if state.estimate is not None:
+            seen = state.estimate.shown(seen)
         if state.disturbance is not None:
             seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:

@@ -14,11 +14,13 @@ from typing import Any
 import jax
 import numpy as np
 
-from e2efly.config import CameraConfig, NoiseConfig
+from e2efly.config import CameraConfig, EstimateConfig, LinkConfig, NoiseConfig
 from e2efly.config.names import unknown
 from e2efly.environment.disturbance import Disturbance
 from e2efly.environment.env_state import EnvState
 from e2efly.environment.environment import Env
+from e2efly.environment.lost_commands import EVERY, LostCommands
+from e2efly.environment.pose_errors import PoseErrors
 from e2efly.environment.stress_cameras import CAMERAS, CameraDraw, CameraRow, with_noise
 from e2efly.simulation.sensors import latency
 from e2efly.vehicles.vehicle import Vehicle
@@ -56,6 +58,10 @@ class StressRow:
     """White noise of the observed state."""
     drift: float = 0.0
     """Random walk of the observed position after one second, m per axis."""
+    estimate: EstimateConfig = EstimateConfig()
+    """Errors of the observed state, which each episode has in full."""
+    link: LinkConfig = LinkConfig()
+    """Commands that are lost, in each episode in full."""
     camera: CameraRow = CameraRow()
     """Changes of the cameras."""
 
@@ -103,6 +109,14 @@ ROWS: dict[str, StressRow] = {
         StressRow("noise and drift of a VIO", noise=VIO, drift=0.005),
         StressRow(ALL),
         *(StressRow(name, camera=row) for name, row in CAMERAS.items()),
+        StressRow("velocity 50 ms late", estimate=EstimateConfig(velocity_lag=0.05)),
+        StressRow("body rates 20 ms late", estimate=EstimateConfig(body_rate_lag=0.02)),
+        StressRow("heading 5 degrees wrong", estimate=EstimateConfig(yaw=math.radians(5))),
+        StressRow("attitude 2 degrees wrong", estimate=EstimateConfig(tilt=math.radians(2))),
+        StressRow("poses repeated up to 4 times", estimate=EstimateConfig(hold=4.0)),
+        StressRow("poses jump by 10 cm", estimate=EstimateConfig(jump=0.1)),
+        StressRow("10 % of the commands lost", link=LinkConfig(dropped=0.1)),
+        StressRow("commands lost for 0.2 s", link=LinkConfig(silence=0.2)),
     )
 }
 """The rows by name. The position of a row determines what it draws, so new rows are added at the end."""
@@ -129,6 +143,10 @@ class Draw:
     noise: NoiseConfig
     """White noise of the observed state, with values of shape (n, 1)."""
     camera: CameraDraw
+    estimate: dict[str, np.ndarray]
+    """Arguments of `PoseErrors.of` but the state."""
+    link: dict[str, np.ndarray]
+    """Fields of `LostCommands` but what arrived."""
 
     @staticmethod
     def of(row: StressRow, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
@@ -182,6 +200,7 @@ class Draw:
             plain_mixer=zero + row.plain_mixer,
             noise=NoiseConfig(**noise),  # type: ignore[arg-type]
             camera=CameraDraw.of(None if everything else row.camera, rng.spawn(1)[0], n),
+            **_told(None if everything else row, rng.spawn(1)[0], n),
         )
 
     def vehicle(self, nominal: Vehicle, i: int) -> Vehicle:
@@ -194,7 +213,14 @@ class Draw:
         """The environment with the changes of a row."""
         mixer = dataclasses.replace(env.physics.mixer, plain=self.plain_mixer)
         physics = dataclasses.replace(env.physics, mixer=mixer)
-        return dataclasses.replace(env, physics=physics, noise=self.noise, cameras=with_noise(env.cameras))
+        return dataclasses.replace(
+            env,
+            physics=physics,
+            noise=self.noise,
+            cameras=with_noise(env.cameras),
+            estimate=EstimateConfig(),
+            link=LinkConfig(),
+        )
 
     def state(self, env: Env, state: EnvState) -> EnvState:
         """The initial state of the episodes with the changes of a row."""
@@ -204,8 +230,40 @@ class Draw:
             plant=self.plant,
             wind=self.wind,
             disturbance=self.disturbance,
+            estimate=PoseErrors.of(**self.estimate, seen=state.vehicle),
+            link=LostCommands(**self.link, arrived=state.actions),
             action_latency=self.latency,
         )
+
+
+def _told(row: StressRow | None, rng: np.random.Generator, n: int) -> dict[str, dict[str, np.ndarray]]:
+    """The errors of the poses and the lost commands of n episodes of a row; None: up to the rows' largest at once."""
+
+    def strength(part: str, name: str) -> np.ndarray:
+        if row is not None:
+            return np.full(n, getattr(getattr(row, part), name))
+        return rng.uniform(0.0, max(getattr(getattr(r, part), name) for r in ROWS.values()), n)
+
+    told = {field.name: strength("estimate", field.name) for field in dataclasses.fields(EstimateConfig)}
+    side, angle, way = rng.choice([-1.0, 1.0], n), rng.uniform(-math.pi, math.pi, n), rng.standard_normal((n, 3))
+    silence = strength("link", "silence")
+    return {
+        "estimate": {
+            "lag": np.stack(
+                [told[f"{name}_lag"] for name in ("position", "velocity", "attitude", "body_rate")], axis=1
+            ),
+            "turned": np.stack(
+                [side * told["yaw"], np.cos(angle) * told["tilt"], np.sin(angle) * told["tilt"]], axis=1
+            ),
+            "jump": told["jump"][:, None] * way / np.linalg.norm(way, axis=1, keepdims=True),
+            "hold": told["hold"],
+        },
+        "link": {
+            "dropped": strength("link", "dropped"),
+            "silence": silence,
+            "phase": silence + (EVERY - silence) * rng.uniform(0, 1, n),
+        },
+    }
 
 
 jax.tree_util.register_dataclass(Draw, data_fields=[f.name for f in dataclasses.fields(Draw)], meta_fields=[])

@@ -52,7 +52,7 @@ def stages(env: Env, task: TaskConfig, curriculum: Sequence[StageConfig] = ()) -
         easier: Any = task
         for path, value in stage.changes.items():
             easier = changed(easier, path, value, where)
-        found.append(_stage(env.on(easier), easier, stage))
+        found.append(_stage(env.eased(stage.strength).on(easier), easier, stage))
         if _shape(found[-1]) != shape:
             raise ValueError(
                 f"{where}.changes has {', '.join(stage.changes)}; accepted: numbers that do not set shapes or the "
