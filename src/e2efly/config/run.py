@@ -49,8 +49,8 @@ class NetworkConfig:
 
 @dataclass(frozen=True)
 class StageConfig:
-    """A stage of a curriculum: the task with a few numbers changed, or with a share of what the environment draws, until
-    it is mastered or its time is over.
+    """A stage of a curriculum: the task with a few numbers changed, or with a share of what is drawn, until it is
+    mastered or its time is over.
     """
 
     changes: dict[str, float | tuple[float, ...]]
