@@ -200,19 +200,16 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         drives = split4(drive[:4])
         if model.driver == "rotor_speed":
             parts = dataclasses.replace(parts, rotor_speed=drives)
-            parts = integrate(plant, parts, drives, None, STEP)
+            parts = integrate(plant, parts, lambda *_: drives, None, STEP)
         elif model.driver == "motor":
-            parts = _recoiled(
-                model, integrate(plant, parts, _driven_speed(model, drives, added), None, STEP), parts, added
-            )
+            turning = _driven_speed(model, drives, added)
+            parts = _recoiled(model, integrate(plant, parts, lambda *_: turning, None, STEP), parts, added)
         elif model.driver == "motor_and_rate":
             parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
-            parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
-        else:  # a flight controller runs at 1 kHz or more: use the mean of its outputs at start and end of the step
-            at_start = law(controller, model.mixer, parts, drives)
-            at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
-            a, b, c, d = (0.5 * x + 0.5 * y for x, y in zip(at_start, at_end, strict=True))
-            parts = integrate(plant, parts, (a, b, c, d), None, STEP)
+            turning = _driven_speed(model, drives, added)
+            parts = integrate(_without_torque(plant), parts, lambda *_: turning, None, STEP)
+        else:
+            parts = integrate(plant, parts, lambda stage, _: law(controller, model.mixer, stage, drives), None, STEP)
         return parts, parts
 
     begin = Parts.of(first)
