@@ -15,7 +15,7 @@ from e2efly.control.vectors import Quat
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
 from e2efly.simulation.physics.control import control_law
-from e2efly.simulation.physics.integrate import INTEGRATORS
+from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, State, split4
 from e2efly.vehicles.vehicle import Vehicle
@@ -200,16 +200,17 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         drives = split4(drive[:4])
         if model.driver == "rotor_speed":
             parts = dataclasses.replace(parts, rotor_speed=drives)
-            parts = integrate(plant, parts, lambda *_: drives, None, STEP)
+            parts = integrate(plant, parts, drives, None, STEP)
         elif model.driver == "motor":
-            turning = _driven_speed(model, drives, added)
-            parts = _recoiled(model, integrate(plant, parts, lambda *_: turning, None, STEP), parts, added)
+            parts = _recoiled(
+                model, integrate(plant, parts, _driven_speed(model, drives, added), None, STEP), parts, added
+            )
         elif model.driver == "motor_and_rate":
             parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
-            turning = _driven_speed(model, drives, added)
-            parts = integrate(_without_torque(plant), parts, lambda *_: turning, None, STEP)
+            parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
         else:
-            parts = integrate(plant, parts, lambda stage, _: law(controller, model.mixer, stage, drives), None, STEP)
+            middle, _ = ahead(plant, parts, None, STEP)
+            parts = integrate(plant, parts, law(controller, model.mixer, middle, drives, None), None, STEP)
         return parts, parts
 
     begin = Parts.of(first)

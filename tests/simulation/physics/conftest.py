@@ -85,7 +85,7 @@ def fly_open_loop() -> Fly:
 
         def one(parts: Parts, command: jax.Array) -> tuple[Parts, State]:
             def substep(_: jax.Array, parts: Parts) -> Parts:
-                return INTEGRATORS[integrator](parts_of_plant, parts, lambda *_: split4(command), air, dt)
+                return INTEGRATORS[integrator](parts_of_plant, parts, split4(command), air, dt)
 
             parts = jax.lax.fori_loop(0, substeps, substep, parts)
             return parts, parts.join()

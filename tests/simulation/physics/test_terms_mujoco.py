@@ -126,5 +126,5 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
 def flown(vehicle: Vehicle, start: State, steps: int) -> State:
     """Our physics at constant rotor speeds."""
     plant, speed = Airframe.of(vehicle, STEP), split4(start.rotor_speed)
-    one = lambda _, parts: INTEGRATORS["rk4"](plant, parts, lambda *_: speed, None, STEP)  # noqa: E731
+    one = lambda _, parts: INTEGRATORS["rk4"](plant, parts, speed, None, STEP)  # noqa: E731
     return jax.lax.fori_loop(0, steps, one, Parts.of(start)).join()

@@ -1,8 +1,8 @@
 """From a command to rotor speed commands: the control law of each command mode.
 
-A command enters the cascade at its own level (`e2efly.control`). Every level below it, down to rotor thrusts and
-speeds, is part of the differential equation: the integrator asks for the rotor commands at each of its stages. All
-laws use the nominal vehicle: the flight controller does not know what was randomised.
+A command enters the cascade at its own level (`e2efly.control`). Every level below it runs along the differential
+equation, down to rotor thrusts and speeds: `integrate.ahead` says at which state. All laws use the nominal vehicle:
+the flight controller does not know what was randomised.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,13 @@ def control_law(mode: CommandMode) -> Law:
 
 
 def remembered(
-    mode: CommandMode, vehicle: Vehicle, memory: RateLoop, begin: Parts, now: Parts, command: Command, time: float
+    mode: CommandMode,
+    vehicle: Vehicle,
+    memory: RateLoop,
+    begin: Parts,
+    now: Parts,
+    command: Command,
+    time: Array | float,
 ) -> RateLoop:
     """What the rate loop remembers at a state that is reached `time` seconds after `begin`, where it was `memory`.
 

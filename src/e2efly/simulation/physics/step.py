@@ -12,9 +12,10 @@ from jaxtyping import Array, Float
 
 from e2efly.config.names import unknown
 from e2efly.control import COMMAND_MODES, Vec3
-from e2efly.simulation.physics.airframe import Airframe, Rotors
+from e2efly.simulation.physics.airframe import Airframe
+from e2efly.simulation.physics.body import reached
 from e2efly.simulation.physics.control import Command, control_law, remembered
-from e2efly.simulation.physics.integrate import INTEGRATORS
+from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, RateLoop, State, split4
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
@@ -138,7 +139,7 @@ def step(
     """
     mode = COMMAND_MODES[physics.command_mode]
     state = started(physics, vehicle, state)
-    law, integrate = control_law(mode), INTEGRATORS[physics.integrator]
+    integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
     plant = Airframe.of(vehicle, dt, rotor_share)
     controller = vehicle_of_loop(physics, vehicle)
@@ -152,19 +153,14 @@ def step(
         if before is not None and switch_time is not None:
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
             acting = _blend(before, after, done)
-
-        def memory(now: Parts, time: float) -> RateLoop | None:
-            return None if loop is None else remembered(mode, controller, loop, parts, now, acting, time)
-
-        def drive(stage: Parts, time: float) -> Rotors:
-            told = law(controller, physics.mixer, stage, acting, memory(stage, time))
-            if physics.full_speed is None:
-                return told
-            a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in told)
-            return a, b, c, d
-
-        moved = integrate(plant, parts, drive, air, dt)
-        return (moved, memory(moved, dt)), None
+        middle, time = ahead(plant, parts, air, dt)
+        memory = None if loop is None else remembered(mode, controller, loop, parts, middle, acting, time)
+        rotor_command = control_law(mode)(controller, physics.mixer, middle, acting, memory)
+        if physics.full_speed is not None:
+            a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
+            rotor_command = a, b, c, d
+        moved = integrate(plant, parts, reached(plant, parts.rotor_speed, rotor_command), air, dt)
+        return (moved, None if loop is None else remembered(mode, controller, loop, parts, moved, acting, dt)), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller
     again = jax.checkpoint(substep, prevent_cse=False)
