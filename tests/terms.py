@@ -14,5 +14,6 @@ VALUES: dict[str, Any] = {
     "battery_voltage": 15.6,
     "voltage_sag": 0.08,
     "speed_per_volt": 0.9,
+    "rotor_speed_ceiling": [2210.0, 2220.0, 2230.0, 1700.0],
 }
 """Of the size that a vehicle like the VIS-R has."""

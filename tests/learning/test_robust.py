@@ -114,7 +114,10 @@ def test_a_weak_vehicle_draws_others_that_can_still_hover(tmp_path: Path, capsys
     assert parse(["hover", "--vehicle", str(strong)]).config.env.disturbance == presets.OTHERS.disturbance
     assert run(["train", "hover", "--env.disturbance.thrust", "0.5", "--out", str(tmp_path / "run")]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "thrust 0.5, rotor 0.1, sag 0.2: the weakest vehicle of these cannot hover (thrust to weight 0.80" in said
+    assert (
+        "thrust 0.5, rotor 0.1, sag 0.2, ceiling 0: the weakest vehicle of these cannot hover (thrust to weight 0.80"
+        in said
+    )
     assert "accepted: draws that leave at least 1" in said
 
 

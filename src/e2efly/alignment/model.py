@@ -15,7 +15,7 @@ from e2efly.control.vectors import Quat
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
 from e2efly.simulation.physics.control import control_law
-from e2efly.simulation.physics.integrate import INTEGRATORS
+from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, State, split4
 from e2efly.vehicles.vehicle import Vehicle
@@ -208,11 +208,9 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         elif model.driver == "motor_and_rate":
             parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
             parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
-        else:  # a flight controller runs at 1 kHz or more: use the mean of its outputs at start and end of the step
-            at_start = law(controller, model.mixer, parts, drives)
-            at_end = law(controller, model.mixer, integrate(plant, parts, at_start, None, STEP), drives)
-            a, b, c, d = (0.5 * x + 0.5 * y for x, y in zip(at_start, at_end, strict=True))
-            parts = integrate(plant, parts, (a, b, c, d), None, STEP)
+        else:
+            middle, _ = ahead(plant, parts, None, STEP)
+            parts = integrate(plant, parts, law(controller, model.mixer, middle, drives, None), None, STEP)
         return parts, parts
 
     begin = Parts.of(first)

@@ -104,7 +104,7 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
 
     def wanted(rate: Array, command: Array) -> Any:
         state = State(jnp.zeros(3), jnp.zeros(3), jnp.eye(4)[0], rate, jnp.zeros(4))
-        return law(controller, model.mixer, Parts.of(state), split4(command))
+        return law(controller, model.mixer, Parts.of(state), split4(command), None)
 
     def follow(speed: Any, seen: tuple[Array, Array]) -> tuple[Any, None]:
         return lagged(speed, wanted(*seen), plant.decay), None

@@ -44,11 +44,14 @@ class DisturbanceConfig:
     its middle vehicle; that of the others is proportional to their arm length."""
     drift: float = number(0.0, high=SPEED)
     """Standard deviation of the observed position's random walk after one second, m per axis."""
+    ceiling: float = number(0.0, high=0.9)
+    """Largest share of its highest thrust that a rotor does not reach. Each rotor of an episode has its own ceiling.
+    Commands below it are not affected."""
 
     @property
     def weakest(self) -> float:
         """The smallest share of the nominal thrust with which an episode can end."""
-        return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag)
+        return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag) * (1 - self.ceiling)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
-"""Effects that a vehicle file does not include: gusts, uneven rotors, a sagging battery, and drifting poses."""
+"""Effects that a vehicle file does not include: gusts, uneven and weak rotors, a sagging battery, drifting poses."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,9 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import DisturbanceConfig
+from e2efly.simulation.physics.body import rotor_speed_for
 from e2efly.tasks.task import uniform
+from e2efly.vehicles.vehicle import Vehicle
 
 jax.tree_util.register_dataclass(
     DisturbanceConfig, data_fields=[field.name for field in fields(DisturbanceConfig)], meta_fields=[]
@@ -34,16 +36,30 @@ class Disturbance:
     """Standard deviation of the poses' drift after one second, m per axis."""
     drift: Float[Array | np.ndarray, "n 3"]
     """Current error of the observed position, world, m."""
+    ceiling: Float[Array | np.ndarray, "n 4"]
+    """Highest thrust of each rotor relative to that of the thrust map at full speed. 1: no ceiling of its own."""
 
     @staticmethod
     def none(n: int) -> "Disturbance":
         """No disturbance."""
         zero, zeros = jnp.zeros(n), jnp.zeros((n, 3))
-        return Disturbance(zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros)
+        return Disturbance(zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)))
 
     def share(self, progress: Float[Array, " n"]) -> Float[Array, "n 4"]:
         """Thrust of each rotor relative to that of the thrust map, after this share of the episode."""
         return jnp.asarray(self.rotor_share) * (1 - self.sag * progress)[:, None]
+
+    def weaker(self, plant: Vehicle, known: Vehicle, thrust_max: float | Array) -> Vehicle:
+        """A plant whose rotors have these ceilings, too.
+
+        Full speed is that at which the thrust map of the vehicle that the flight controller knows has its largest
+        thrust, `thrust_max`, N.
+        """
+        shares = jnp.moveaxis(jnp.asarray(self.ceiling), -1, 0)
+        speeds = rotor_speed_for(known, tuple(share * thrust_max for share in shares))  # type: ignore[arg-type]
+        most = jnp.stack([jnp.where(s < 1, w, jnp.inf) for s, w in zip(shares, speeds, strict=True)], axis=-1)
+        own = plant.rotor_speed_ceiling
+        return replace(plant, rotor_speed_ceiling=most if own is None else jnp.minimum(own, most))
 
 
 def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
@@ -66,6 +82,7 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
         sag=config.sag * strength[1],
         drift_rate=config.drift * strength[2],
         drift=jnp.zeros((n, 3)),
+        ceiling=1 - config.ceiling * jax.random.uniform(jax.random.fold_in(key, 3), (n, 4)),
     )
 
 
@@ -80,4 +97,4 @@ def advance(d: Disturbance, key: PRNGKeyArray, dt: float) -> Disturbance:
     fresh = d.gust_speed * jnp.sqrt(1 - kept**2)
     gust = kept[:, None] * d.gust + fresh[:, None] * noise[0]
     drift = d.drift + d.drift_rate[:, None] * jnp.sqrt(dt) * noise[1]
-    return Disturbance(d.gust_speed, d.gust_time, gust, d.rotor_share, d.sag, d.drift_rate, drift)
+    return replace(d, gust=gust, drift=drift)

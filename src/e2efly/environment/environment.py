@@ -372,6 +372,7 @@ class Env:
             gust = jnp.asarray(disturbed.gust)
             wind = gust if wind is None else wind + gust
             share = disturbed.share(state.time / self.task.episode_s)
+            plant = disturbed.weaker(plant, physics.nominal, physics.mixer.thrust_max)
             disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
         after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
 

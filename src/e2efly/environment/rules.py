@@ -9,7 +9,7 @@ from e2efly.simulation.sensors.image_noise import check as check_noise
 from e2efly.vehicles.family import Family
 from e2efly.vehicles.posterior import WIDEST, Posterior
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.vehicles.vehicle_rules import battery_share
+from e2efly.vehicles.vehicle_rules import reached_share
 from e2efly.vehicles.widths import check_widths
 
 
@@ -46,10 +46,12 @@ def check(
         drawn *= 1 - WIDEST * posterior.thrust_sigma
     if body.battery_voltage is not None:
         empty = (1 - config.randomize.get("battery_voltage", 0.0)) * body.battery_voltage
-        drawn *= battery_share(dataclasses.replace(body, battery_voltage=empty))
+        body = dataclasses.replace(body, battery_voltage=empty)
+    if body.battery_voltage is not None or body.rotor_speed_ceiling is not None:
+        drawn *= reached_share(body)
     if drawn < 1:
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
-            f"rotor {d.rotor:g}, sag {d.sag:g}: the weakest vehicle of these cannot hover (thrust to weight "
-            f"{drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that leave at least 1"
+            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}: the weakest vehicle of these cannot hover "
+            f"(thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that leave at least 1"
         )

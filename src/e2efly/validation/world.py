@@ -15,7 +15,7 @@ import numpy as np
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.body import powered
+from e2efly.simulation.physics.body import reached
 from e2efly.simulation.physics.integrate import rk4
 from e2efly.simulation.physics.state import Parts
 from e2efly.validation.plant_flight import imu_of
@@ -91,7 +91,7 @@ class World:
             command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Airframe.of(vehicle, STEP_S, row[24:28])
 
             def step(parts: Parts, _: None) -> tuple[Parts, None]:
-                told = powered(plant, parts.rotor_speed, command)  # type: ignore[arg-type]
+                told = reached(plant, parts.rotor_speed, command)  # type: ignore[arg-type]
                 free = rk4(plant, parts, told, air, STEP_S)
                 return _stand(vehicle, free), None
 

@@ -108,6 +108,8 @@ class Vehicle:
     """Voltage that the battery loses under load, divided by the thrust of all rotors. If left out: no loss."""
     speed_per_volt: Any = _term("1", at_least=0.0)
     """Relative change of rotor speed divided by relative change of voltage, at a given command. If left out: 1."""
+    rotor_speed_ceiling: Any = _term("rad/s", (4,), above=0.0)
+    """Highest speed that each rotor really reaches, whatever the command. The flight controller does not know it."""
 
     @property
     def hash(self) -> str:

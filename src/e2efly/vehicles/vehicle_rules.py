@@ -15,18 +15,21 @@ LEAST_VOLTAGE = 0.1
 """Lower limit of the battery voltage, as a share of the nominal voltage. It keeps a gradient for the rotor speed."""
 
 
-def battery_share(vehicle: Vehicle) -> float:
-    """Largest steady thrust of all rotors with the vehicle's battery, divided by that at the nominal voltage."""
-    if vehicle.battery_voltage is None:
-        return 1.0
+def reached_share(vehicle: Vehicle) -> float:
+    """Largest steady thrust with the vehicle's battery, if each rotor had the lowest ceiling, divided by that without
+    both.
+    """
     full, most = vehicle.full_rotor_speed, 4 * vehicle.thrust_range[1]
+    ceiling = np.inf if vehicle.rotor_speed_ceiling is None else float(np.min(vehicle.rotor_speed_ceiling))
+    if vehicle.battery_voltage is None:
+        return 4 * vehicle.rotor_thrust(min(full, ceiling)) / most
     sag = 0.0 if vehicle.voltage_sag is None else vehicle.voltage_sag
     exponent = 1.0 if vehicle.speed_per_volt is None else vehicle.speed_per_volt
     low, high = 0.0, 1e6
     for _ in range(100):  # more thrust lowers the voltage, and a lower voltage gives less thrust
         middle = (low + high) / 2
         volts = max((vehicle.battery_voltage - sag * middle) / vehicle.nominal_voltage, LEAST_VOLTAGE)
-        gives = 4 * vehicle.rotor_thrust(full * volts**exponent)
+        gives = 4 * vehicle.rotor_thrust(min(full * volts**exponent, ceiling))
         low, high = (middle, high) if gives > middle else (low, middle)
     return low / most
 
@@ -43,7 +46,12 @@ def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: 
         raise ValueError(
             f"{where}: {' and '.join(given)} without {' and '.join(missing)}; accepted: all of these entries"
         )
-    reached = battery_share(vehicle) * vehicle.thrust_to_weight
+    reached = reached_share(vehicle) * vehicle.thrust_to_weight
+    if reached <= 1.05 and vehicle.battery_voltage is None:
+        raise ValueError(
+            f"{where}: rotor_speed_ceiling.value is {np.asarray(vehicle.rotor_speed_ceiling).tolist()} rad/s: it "
+            f"cannot hover (thrust to weight {reached:.2f} if each rotor had the lowest; accepted: more than 1.05)"
+        )
     if reached <= 1.05:
         raise ValueError(
             f"{where}: battery_voltage.value is {vehicle.battery_voltage} V, nominal_voltage.value "

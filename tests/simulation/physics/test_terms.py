@@ -16,7 +16,7 @@ from e2efly.simulation.physics import INTEGRATORS, Physics, RateLoop, State, sta
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import angular_acceleration
 from e2efly.vehicles.vehicle import Vehicle, inertia_tensor, terms
-from e2efly.vehicles.vehicle_rules import BATTERY, battery_share
+from e2efly.vehicles.vehicle_rules import BATTERY, reached_share
 from tests.gradients import central, reverse
 from tests.terms import VALUES
 
@@ -34,6 +34,7 @@ NOTHING: dict[str, Any] = {
     "battery_voltage": 14.8,
     "voltage_sag": 0.0,
     "speed_per_volt": 1.0,
+    "rotor_speed_ceiling": [1e6] * 4,
 }
 """Values at which a term does nothing."""
 
@@ -246,10 +247,10 @@ def test_the_filter_and_the_integral_by_their_closed_forms(stone: Vehicle) -> No
     start = State.hovering(vehicle, jnp.zeros(3))
     start = dataclasses.replace(start, body_rate=jnp.asarray(rate), rate_loop=RateLoop(jnp.zeros(3), jnp.zeros(3)))
     end = step(physics, body, start, jnp.asarray([0.0, 3.0, 0.0, 0.0]))
-    dt = physics.control_period / physics.substeps
-    seen = 1 - np.exp(-dt * np.arange(1, physics.substeps + 1) / vehicle.gyro_time_constant)
-    np.testing.assert_allclose(end.rate_loop.seen, [seen[-1], 0, 0], rtol=1e-4, atol=1e-4)
-    integral = vehicle.rate_integral_gain[0] * dt * np.sum(3 - seen)
+    t, lag = physics.control_period, vehicle.gyro_time_constant
+    seen = 1 - np.exp(-t / lag)
+    np.testing.assert_allclose(end.rate_loop.seen, [seen, 0, 0], rtol=1e-4, atol=1e-4)
+    integral = vehicle.rate_integral_gain[0] * (3 * t - (t - lag * seen))
     np.testing.assert_allclose(end.rate_loop.integral, [integral, 0, 0], rtol=1e-4, atol=1e-3)
 
 
@@ -271,5 +272,23 @@ def test_full_rotors_turn_as_fast_as_the_sagging_battery_lets_them(vis_r: Vehicl
     thrust = 4 * vehicle.rotor_thrust(speed)
     voltage = 15.6 - 0.08 * thrust
     assert speed == pytest.approx(vis_r.full_rotor_speed * (voltage / 14.8) ** 0.9, rel=1e-5)
-    assert thrust == pytest.approx(battery_share(vehicle) * 4 * vis_r.thrust_range[1], rel=1e-5)
-    assert 0.8 < battery_share(vehicle) < 0.99
+    assert thrust == pytest.approx(reached_share(vehicle) * 4 * vis_r.thrust_range[1], rel=1e-5)
+    assert 0.8 < reached_share(vehicle) < 0.99
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_no_rotor_passes_its_ceiling(integrator: str, vis_r: Vehicle, fly: Callable[..., State]) -> None:
+    """Each has its own; one that is above it slows down to it, and the battery does not lift it."""
+    most = np.array([1500.0, 2000.0, 2500.0, 1e6])
+    vehicle = dataclasses.replace(having(vis_r, "voltage_sag"), rotor_speed_ceiling=most)
+    physics = Physics.of(vehicle, "rotor_thrust", integrator, control_rate=100.0, dtype=np.float64)
+    path = fly(physics, vehicle, State.hovering(vehicle, jnp.zeros(3)), jnp.full((100, 4), vis_r.thrust_range[1]))
+    speed = np.array(path.rotor_speed[-1])
+    np.testing.assert_allclose(speed[:3], most[:3], rtol=1e-9)
+    assert 2600 < speed[3] < vis_r.full_rotor_speed * (15.6 / 14.8)
+
+
+def test_a_low_ceiling_is_part_of_the_thrust_that_a_vehicle_reaches(vis_r: Vehicle) -> None:
+    vehicle = dataclasses.replace(vis_r, rotor_speed_ceiling=np.array([3000.0, 2500.0, 3000.0, 3000.0]))
+    assert reached_share(vehicle) == pytest.approx(vis_r.rotor_thrust(2500.0) / vis_r.thrust_range[1])
+    assert reached_share(vis_r) == pytest.approx(1)

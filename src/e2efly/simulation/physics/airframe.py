@@ -90,6 +90,8 @@ class Airframe:
     battery: Battery | None = None
     centre: Vec3 | None = None
     """Centre of mass relative to the point where the drag acts, body, m."""
+    ceiling: Rotors | None = None
+    """Highest speed that each rotor reaches, rad/s."""
 
     @staticmethod
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Airframe":
@@ -130,6 +132,7 @@ class Airframe:
             products=products,
             mobility_products=mobility_products,
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),
+            ceiling=None if v.rotor_speed_ceiling is None else split4(v.rotor_speed_ceiling),
         )
 
 

@@ -24,17 +24,23 @@ def rotor_thrust(plant: Airframe, rotor_speed: Rotors) -> Rotors:
     return a * s[0], b * s[1], c * s[2], d * s[3]
 
 
-def powered(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
-    """Speeds, rad/s, that rotors approach under speed commands, at the battery voltage under their present thrust."""
+def reached(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
+    """Speeds, rad/s, that rotors approach under speed commands.
+
+    The battery's voltage is that under their present thrust. No rotor passes its ceiling.
+    """
     battery = plant.battery
-    if battery is None:
+    if battery is not None:
+        voltage = battery.voltage
+        if battery.sag is not None:
+            a, b, c, d = rotor_thrust(plant, rotor_speed)
+            voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
+        share = voltage if battery.exponent is None else voltage**battery.exponent
+        a, b, c, d = (share * speed for speed in command)
+        command = a, b, c, d
+    if plant.ceiling is None:
         return command
-    voltage = battery.voltage
-    if battery.sag is not None:
-        a, b, c, d = rotor_thrust(plant, rotor_speed)
-        voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
-    share = voltage if battery.exponent is None else voltage**battery.exponent
-    a, b, c, d = (share * speed for speed in command)
+    a, b, c, d = (jnp.minimum(speed, most) for speed, most in zip(command, plant.ceiling, strict=True))
     return a, b, c, d
 
 

@@ -1,8 +1,8 @@
 """From a command to rotor speed commands: the control law of each command mode.
 
-A command enters the cascade at its own level (`e2efly.control`). Every level below it runs at every physics sub-step,
-down to rotor thrusts and speeds. All laws use the nominal vehicle: the flight controller does not know what was
-randomised.
+A command enters the cascade at its own level (`e2efly.control`). Every level below it runs along the differential
+equation, down to rotor thrusts and speeds: `integrate.ahead` says at which state. All laws use the nominal vehicle:
+the flight controller does not know what was randomised.
 """
 
 from collections.abc import Callable
@@ -18,54 +18,65 @@ from e2efly.simulation.physics.state import Parts, RateLoop
 from e2efly.vehicles.vehicle import Vehicle
 
 Command = tuple[Array, Array, Array, Array]
-Law = Callable[[Vehicle, Mixer, Parts, Command], Rotors]
-"""(nominal vehicle, its mixer, state, command) -> rotor speed commands, rad/s."""
-RememberingLaw = Callable[[Vehicle, Mixer, Parts, Command, RateLoop, float], tuple[Rotors, RateLoop]]
-"""The same, with the state of the rate loop, split into components, and the time since the loop last ran, s."""
+Law = Callable[[Vehicle, Mixer, Parts, Command, RateLoop | None], Rotors]
+"""(nominal vehicle, its mixer, state, command, memory of the rate loop) -> rotor speed commands, rad/s."""
 
 
 def control_law(mode: CommandMode) -> Law:
     """The control law of a command mode: rotor thrusts within their limits, or body rates held by the rate loop."""
     controller = mode.controller
 
-    def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command) -> Rotors:
+    def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command, memory: RateLoop | None = None) -> Rotors:
         if controller is None:
             if mode.of_largest:
                 a, b, c, d = (share * mixer.thrust_max for share in command)
                 command = a, b, c, d
             return rotor_speed_for(vehicle, mixer.limit(command))
-        return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, command))
+        return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, command), memory)
 
     return law
 
 
-def remembering_law(mode: CommandMode) -> RememberingLaw:
-    """The control law of a command mode whose rate loop has an integral part, a filter of the body rates, or both."""
-    controller = mode.controller
-    assert controller is not None, "no rate loop"
+def remembered(
+    mode: CommandMode,
+    vehicle: Vehicle,
+    memory: RateLoop,
+    begin: Parts,
+    now: Parts,
+    command: Command,
+    time: Array | float,
+) -> RateLoop:
+    """What the rate loop remembers at a state that is reached `time` seconds after `begin`, where it was `memory`.
 
-    def law(
-        vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command, loop: RateLoop, dt: float
-    ) -> tuple[Rotors, RateLoop]:
-        wanted, rate, extra = controller(vehicle, parts, command), parts.body_rate, None
-        if loop.seen is not None:
-            rate = rate + (loop.seen - rate) * jnp.exp(-dt / vehicle.gyro_time_constant)
-        if loop.integral is not None:
-            change = Vec3.of(vehicle.rate_integral_gain).times(wanted.rate - rate) * dt
-            # limited to the proportional part at an error of `body_rate_max`, so that it does not wind up when rotors
-            # saturate
-            extra = (loop.integral + change).clip(Vec3.of(vehicle.rate_gain * vehicle.body_rate_max))
-        rotors = _rates(vehicle, mixer, rate, wanted, extra)
-        return rotors, RateLoop(extra, None if loop.seen is None else rate)
-
-    return law
-
-
-def _rates(vehicle: Vehicle, mixer: Mixer, rate: Vec3, wanted: Ctbr, extra: Vec3 | None = None) -> Rotors:
-    """The rate loop at body rates w: torque = J (K (wanted - w) + extra) + w x J w.
-
-    Units: rad/s, `extra` in rad/s^2.
+    The body rates in between are those of a constant acceleration. With T s' = w - s for the filtered rates s, their
+    integral is that of the true rates w, minus T times the change of s.
     """
+    assert mode.controller is not None, "no rate loop"
+    mean, seen, integral = (begin.body_rate + now.body_rate) * 0.5, None, None
+    turned = mean * time
+    if memory.seen is not None:
+        lag = vehicle.gyro_time_constant
+        left, half = jnp.exp(-time / lag), jnp.exp(-0.5 * time / lag)
+        followed = begin.body_rate + (now.body_rate - begin.body_rate) * ((2 * half + 1) / (left + 4 * half + 1))
+        seen = followed + (memory.seen - followed) * left
+        turned = turned - (seen - memory.seen) * lag
+    if memory.integral is not None:
+        wanted = (mode.controller(vehicle, begin, command).rate + mode.controller(vehicle, now, command).rate) * 0.5
+        # limited to the proportional part at an error of `body_rate_max`, so that it does not wind up when rotors
+        # saturate
+        most = Vec3.of(vehicle.rate_gain * vehicle.body_rate_max)
+        integral = (memory.integral + Vec3.of(vehicle.rate_integral_gain).times(wanted * time - turned)).clip(most)
+    return RateLoop(integral, seen)
+
+
+def _rates(vehicle: Vehicle, mixer: Mixer, rate: Vec3, wanted: Ctbr, memory: RateLoop | None) -> Rotors:
+    """The rate loop: torque = J (K (wanted - w) + I) + w x J w, at the body rates w, rad/s.
+
+    A loop with a filter has filtered rates in their place. I is its integral part, rad/s^2.
+    """
+    extra = None if memory is None else memory.integral
+    if memory is not None and memory.seen is not None:
+        rate = memory.seen
     error, inertia = wanted.rate - rate, Vec3.of(vehicle.inertia)
     if vehicle.inertia_products is None:
         pushed, products = Vec3.of(vehicle.inertia * vehicle.rate_gain).times(error), None

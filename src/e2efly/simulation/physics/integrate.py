@@ -16,6 +16,9 @@ from e2efly.simulation.physics.state import Parts
 Integrator = Callable[[Airframe, Parts, Rotors, Vec3 | None, float], Parts]
 """(plant, state, rotor speed commands, wind, step in s) -> state one step later."""
 
+HOLD = 0.00025
+"""Time for which a flight controller holds its rotor commands, s: its rate loop runs at 4 kHz."""
+
 
 def lagged(
     speed: Rotors, command: Rotors, decay: Array | np.ndarray, decay_down: Array | np.ndarray | None = None
@@ -30,6 +33,18 @@ def lagged(
     else:
         a, b, c, d = (u + (w - u) * jnp.where(u < w, decay_down, decay) for w, u in zip(speed, command, strict=True))
     return a, b, c, d
+
+
+def ahead(plant: Airframe, parts: Parts, wind: Vec3 | None, dt: float) -> tuple[Parts, float]:
+    """The state at which the flight controller computes the rotor commands of a step, and its time in the step, s.
+
+    Held over the whole step, commands of the state in the middle act as the rate loop does that runs along the
+    differential equation, to second order. The middle is predicted by the derivative at the start, which the methods
+    of higher order need anyway. A loop that runs every `HOLD` is half of that behind.
+    """
+    time = (dt - jnp.minimum(HOLD, dt)) / 2
+    moved = _advance(parts, derivative(plant, parts, wind), time)
+    return _finish(moved, parts.rotor_speed), time
 
 
 def euler(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | None, dt: float) -> Parts:

@@ -1,4 +1,4 @@
-"""One control step: physics sub-steps under a command, with the rate loop at each of them."""
+"""One control step: physics sub-steps under a command, with the rate loop inside of each."""
 
 import dataclasses
 import math
@@ -13,9 +13,9 @@ from jaxtyping import Array, Float
 from e2efly.config.names import unknown
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.body import powered
-from e2efly.simulation.physics.control import Command, control_law, remembering_law
-from e2efly.simulation.physics.integrate import INTEGRATORS
+from e2efly.simulation.physics.body import reached
+from e2efly.simulation.physics.control import Command, control_law, remembered
+from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, RateLoop, State, split4
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
@@ -153,15 +153,14 @@ def step(
         if before is not None and switch_time is not None:
             done = jnp.clip((index + 1) - switch_time / dt, 0.0, 1.0).astype(command.dtype)
             acting = _blend(before, after, done)
-        if loop is None:
-            rotor_command = control_law(mode)(controller, physics.mixer, parts, acting)
-        else:
-            rotor_command, loop = remembering_law(mode)(controller, physics.mixer, parts, acting, loop, dt)
+        middle, time = ahead(plant, parts, air, dt)
+        memory = None if loop is None else remembered(mode, controller, loop, parts, middle, acting, time)
+        rotor_command = control_law(mode)(controller, physics.mixer, middle, acting, memory)
         if physics.full_speed is not None:
             a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
             rotor_command = a, b, c, d
-        rotor_command = powered(plant, parts.rotor_speed, rotor_command)
-        return (integrate(plant, parts, rotor_command, air, dt), loop), None
+        moved = integrate(plant, parts, reached(plant, parts.rotor_speed, rotor_command), air, dt)
+        return (moved, None if loop is None else remembered(mode, controller, loop, parts, moved, acting, dt)), None
 
     # a gradient computes each sub-step again from its start: faster than storing what is inside, and far smaller
     again = jax.checkpoint(substep, prevent_cse=False)

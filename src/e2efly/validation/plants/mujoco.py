@@ -2,7 +2,7 @@
 
 MuJoCo integrates all parts of the motion together, by RK4: the rigid body and its gyroscopic torque, the lag of the
 rotors, the points at which their thrust and torque act, the drag, and the contact of the feet with the ground. The
-flight controller (rate loop and mixer, float64) runs before every step of at most 1 ms. Three parts need an
+flight controller (rate loop and mixer, float64) runs before every step of at most 1 ms. Four parts need an
 explanation:
 
 - The activation of a motor is its rotor's *speed* (`dyntype` filter, driven by the commanded speed), because the lag
@@ -15,6 +15,9 @@ explanation:
 - The angular momentum of the rotors is included if the vehicle has rotor inertia. Over a step the rotors give the body
   the momentum that they lose, and the torque w x h. The body rate w is that in the middle of the step, extrapolated
   from its last change.
+- The flight controller of the simulator runs at 4 kHz. Here it runs once a step, and is therefore given the body rate
+  at which a faster one has computed its commands in the mean: that in the middle of the step, less half of a period of
+  that loop. It is extrapolated from the last change of the body rate.
 """
 
 import importlib
@@ -33,6 +36,8 @@ from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
 STEP = 1e-3
 """Longest step of MuJoCo and of the rate loop, s."""
+HOLD = 0.00025
+"""Period of the rate loop that is simulated, s."""
 FOOT = 0.005
 """Radius of the balls under the rotors on which the vehicle stands, m."""
 _CALM = Vec3(0.0, 0.0, 0.0)
@@ -120,6 +125,7 @@ class MujocoPlant(Plant):
         self._body = body
         self._controller = FlightController(self._believed.under(body, *RATE_LOOP), self._mode, plain_mixer)
         self._full_speed = body.full_rotor_speed
+        self._ceiling = np.inf if body.rotor_speed_ceiling is None else body.rotor_speed_ceiling
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
         """Set wind and shares of thrust from now on."""
@@ -154,9 +160,13 @@ class MujocoPlant(Plant):
         linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
         for _ in range(count):
             model.opt.timestep = dt / count
-            thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), data.qvel.tolist(), dt / count)
+            period, rate = dt / count, data.qvel[3:].copy()
+            coming = rate + (rate - self._last_rate) * (period - min(HOLD, period)) / (2 * period)
+            motion = [*data.qvel[:3].tolist(), *coming.tolist()]
+            thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), motion, period)
             speed = data.act.copy()
-            data.ctrl[:4] = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
+            reached = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
+            data.ctrl[:4] = np.minimum(reached, self._ceiling)
             model.actuator_dynprm[:4, 0] = self._lags()
             model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
             model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
@@ -167,6 +177,7 @@ class MujocoPlant(Plant):
             model.actuator_biasprm[4:7, 2] = -drag
             if self._body.rotor_inertia is not None:
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
+            self._last_rate = rate
             self._mujoco.mj_step(model, data)
 
     def _powered(self, speed: np.ndarray) -> float:
@@ -197,6 +208,5 @@ class MujocoPlant(Plant):
         change = inertia @ after - before
         rate = data.qvel[3:]
         p, q, _ = 1.5 * rate - 0.5 * self._last_rate
-        self._last_rate = rate.copy()
         middle = before + change / 2
         return np.array([-q * middle, p * middle, -change / dt])
