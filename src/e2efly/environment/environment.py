@@ -37,7 +37,7 @@ from e2efly.environment.rules import check
 from e2efly.environment.signals import dangers, happened
 from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
-from e2efly.simulation.physics import Physics, started, step
+from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
 from e2efly.simulation.physics.rotation import unrotate
 from e2efly.simulation.scenes import scene as scenes
@@ -458,6 +458,10 @@ class Env:
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
+        return self.shown(state, self.sensed(state))
+
+    def sensed(self, state: EnvState) -> State:
+        """The motion that is observed of a state, with its age and its errors."""
         seen = state.vehicle
         if state.past is not None:
             seen = latency.delayed_state(state.past, state.observation_latency, self.control_period)
@@ -465,6 +469,10 @@ class Env:
             seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:
             seen = add_noise(self.noise, state.key_of(SEEN), seen)
+        return seen
+
+    def shown(self, state: EnvState, seen: State) -> Float[Array, "n o"]:
+        """The observation of a state whose observed motion is `seen`."""
         known = Known(seen, state.imu, state.actions[:, : self.seen_actions])
         own = (row.value(known) for row in self._own)
         return jnp.concatenate([self.task.observe(state.memory, state.time, seen), *own], axis=-1)
