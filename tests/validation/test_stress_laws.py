@@ -3,6 +3,7 @@
 import ast
 import dataclasses
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,11 @@ def test_no_training_can_draw_a_law() -> None:
             for name in (getattr(node, "module", None) or "", *(alias.name for alias in node.names))
         }
         assert not [name for name in names if "stress_laws" in name or "law_step" in name], file
+
+
+def test_the_page_of_the_stress_names_every_law() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "robustness.md").read_text(encoding="utf-8")
+    assert [name for name in LAWS if not re.search(rf"[|,] {name}[ ,|]", page)] == []
 
 
 def test_no_preset_changes_a_field_of_the_vehicle_that_a_law_changes() -> None:

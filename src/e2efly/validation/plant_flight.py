@@ -106,6 +106,7 @@ def fly(
     delay = Delay.of(latency, contract.action.command(np.array(contract.hover_action)))
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
+    moved = law is not None and law.disturbs
     felt = None if law is None else LawMemory.of(states[0], np.array(contract.hover_action), period, LATEST)
     samples = [] if sample is None else [FlightSample.of(plant, 0.0)]
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
@@ -127,7 +128,7 @@ def fly(
                 arrives, felt = arrived(law.at(k), felt, decision.action)
                 command = contract.action.command(arrives)
                 delay = dataclasses.replace(delay, latency=latency + float(law.later[k]))
-                if law.disturbs:
+                if moved:
                     plant.disturb(*air_of(law.at(k), states[-1]))
             delay, parts = delay.send(command, now).until(now, then)
             if disturbed and air is not None:

@@ -28,8 +28,8 @@ from e2efly.vehicles.vehicle import Controller, Vehicle
 
 FLIGHTS = 10
 """Default number of starts per row and criterion. Each takes a second on MuJoCo or through the firmware."""
-AIR = 19 * 8
-"""Memory of the air of one control step, bytes."""
+AIR = 45 * 8
+"""Memory of the air, or of a law, in one control step, bytes."""
 
 
 def stress(

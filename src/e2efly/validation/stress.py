@@ -242,7 +242,9 @@ def _full_speed(env: Env, law: LawStep) -> Array:
 def laws_of(law: StressLaw, vehicle: Vehicle, seed: int, n: int, steps: int, period: float) -> LawStep:
     """The control steps of the first n flights under a law. They do not depend on the number of flights."""
     batches = [law_of(law, vehicle, seed, i, steps, period) for i in range(-(-n // BATCH))]
-    return jax.tree.map(lambda *x: np.concatenate(x, axis=1)[:, :n], *batches)
+    return jax.tree.map(
+        lambda *x: np.concatenate([part[:, : n - i * BATCH] for i, part in enumerate(x)], axis=1), *batches
+    )
 
 
 def law_of(law: StressLaw, vehicle: Vehicle, seed: int, batch: int, steps: int, period: float) -> LawStep:
