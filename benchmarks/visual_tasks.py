@@ -41,7 +41,7 @@ def run(case: str, algo: str, seed: int, episodes: int) -> dict[str, Any]:
     """One training, and its policy in all rows: a summary by row and criterion."""
     with tempfile.TemporaryDirectory() as folder:
         told = train(case, algo, seed, Path(folder) / "run")
-        found = stress(Path(folder) / "run", episodes)
+        found = stress(Path(folder) / "run", episodes).trained
     flown = {row: {name: summary(e) for name, e in of.items()} for row, of in found.flown.items()}
     return {"case": case, **told, "flown": flown}
 

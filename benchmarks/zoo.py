@@ -11,8 +11,9 @@ configuration and the curve of its training.
 The preset is `robust` where the task has it. The best of at most `seeds` runs by each algorithm is kept, if it succeeds
 more often than not; none more is made once one meets 99.5 %, or a robust one 97 % in its worst row of the stress. What
 is best the runs' own reports say, and of robust ones those rows, from starts of their own; of a family's, unseen
-vehicles in still air. The success that is stated is that of the lone ONNX file, of the 1000 starts of `e2efly eval` and
-`eval --stress`, which nothing was chosen by; in the rows, of a policy that sees, of the first 250 of them.
+vehicles in still air. The rows from laws that no training draws from choose nothing. The success that is stated is that
+of the lone ONNX file, of the 1000 starts of `e2efly eval` and `eval --stress`, which nothing was chosen by; in the
+rows, of a policy that sees, of the first 250 of them.
 
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
@@ -41,7 +42,7 @@ from common import arguments, table
 
 from e2efly.config.storage import write_json
 from e2efly.environment.limits import posterior_of, vehicles_of
-from e2efly.environment.stress_rows import ALL
+from e2efly.environment.stress_rows import ALL, rows_for
 from e2efly.flight.sight.samples import COUNT, packed, samples_file
 from e2efly.learning.judge import worst_success
 from e2efly.learning.onnx_export import write_policy
@@ -81,12 +82,17 @@ def algorithms(task: str) -> tuple[str, ...]:
     return (TASKS[VARIANTS.get(task, (task, ""))[0]].best,)
 
 
-def stressed(policy: Path, folder: Path, *options: str) -> dict[str, float]:
-    """Success of the worst criterion in each row of the stress."""
+def stressed(policy: Path, folder: Path, *options: str) -> dict[str, dict[str, float]]:
+    """Success of the worst criterion in each row of the stress: `stress`, the rows that trainings draw from, and
+    `untrained`, the rows from laws that none draws from.
+    """
     report = folder / "stress.json"
     run("eval", str(policy), "--stress", "--json", str(report), "--plots", str(folder / "plots"), *options)
-    rows = json.loads(report.read_text())["stress"]
-    return {row: min(found["success"] for found in criteria.values()) for row, criteria in rows.items()}
+    said = json.loads(report.read_text())
+    return {
+        kind: {row: min(found["success"] for found in criteria.values()) for row, criteria in said[kind].items()}
+        for kind in ("stress", "untrained")
+    }
 
 
 def starts(task: str) -> tuple[str, ...]:
@@ -122,12 +128,13 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
     more: dict[str, Any] = {"preset": "robust"} if together else {"preset": name} if name else {}
     if name == "robust":
         if chosen:
-            rows = stressed(out / "policy.onnx", folder, "--episodes", "250", "--seed", str(CHOSEN_BY))
+            options = ("--episodes", "250", "--seed", str(CHOSEN_BY), "--rows", *rows_for(TASKS[task].cameras))
+            rows = stressed(out / "policy.onnx", folder, *options)["stress"]
             at_once = rows.pop(ALL)
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
         if TASKS[task].cameras:
             more |= {"mean_speed_m_s": {name: suite["mean_speed_m_s"] for name, suite in suites.items()}}
-        more |= {"stress": stressed(out / "policy.onnx", folder, *starts(task))}
+        more |= stressed(out / "policy.onnx", folder, *starts(task))
     return reported, {
         "algorithm": summary["algorithm"],
         "seed": summary["seed"],
@@ -249,9 +256,10 @@ def main() -> None:
             about = zoo[vehicle].get(task, {})
             if about.get("preset") == "robust" and vehicle not in family_names():
                 with tempfile.TemporaryDirectory() as folder:
-                    about["stress"] = stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder), *starts(task))
+                    about |= stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder), *starts(task))
                 write(contents() | {vehicle: contents()[vehicle] | {task: about}})
-                print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}", flush=True)
+                worst = min(about["untrained"].values())
+                print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}, {worst:.3f} untrained", flush=True)
         return
     rows = []
     for out in map(Path, options.runs):

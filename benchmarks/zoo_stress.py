@@ -4,9 +4,9 @@
     python benchmarks/zoo_stress.py --tasks gap hover_aware
     python benchmarks/zoo_stress.py --by-sight
 
-Percent of 1000 starts in each row (250 of those who see), of the worst criterion. The zoo's figures are those of
-zoo.json, which `benchmarks/zoo.py` has measured; the others are trained here (seed 0). `--by-sight`: the tasks with
-cameras, of which the zoo alone is shown; it trains nothing.
+Percent of 1000 starts in each row (250 of those who see), of the worst criterion. The last rows are from laws that no
+training draws from. The zoo's figures are those of zoo.json, which `benchmarks/zoo.py` has measured; the others are
+trained here (seed 0). `--by-sight`: the tasks with cameras, of which the zoo alone is shown; it trains nothing.
 """
 
 import tempfile
@@ -21,6 +21,7 @@ from e2efly.environment.stress_rows import ROWS, rows_for
 from e2efly.policy.zoo import contents
 from e2efly.tasks import TASKS
 from e2efly.validation.stress import stress
+from e2efly.validation.stress_laws import LAWS
 from e2efly.vehicles.loading import vehicle_names
 
 
@@ -41,14 +42,15 @@ def main() -> None:
     for task in [task for task in TASKS if TASKS[task].cameras] if options.by_sight else options.tasks:
         for vehicle in vehicle_names():
             if "stress" in zoo[vehicle].get(task, {}):
-                columns[f"{task}, {vehicle}"] = zoo[vehicle][task]["stress"]
+                about = zoo[vehicle][task]
+                columns[f"{task}, {vehicle}"] = about["stress"] | about.get("untrained", {})
         if not options.by_sight:
             with tempfile.TemporaryDirectory() as folder:
                 e2efly.train(task, "bptt", preset_name="nominal", out=Path(folder) / "run")
                 columns[f"{task}, vis_r, preset nominal"] = stress(Path(folder) / "run").success
     rows = [
         {"row": row} | {name: f"{100 * found[row]:.1f}" if row in found else "-" for name, found in columns.items()}
-        for row in (ROWS if options.by_sight else rows_for(()))
+        for row in (*(ROWS if options.by_sight else rows_for(())), *LAWS)
     ]
     if options.by_sight:
         rows += [_by_criterion(columns, "success of 1000 starts", lambda about: about["success"], 100)]

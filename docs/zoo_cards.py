@@ -43,6 +43,8 @@ VEHICLES = {
 }
 WORST = 3
 """Rows of the stress that a card names."""
+UNTRAINED_ENOUGH = 0.95
+"""Success from which on a row counts as met by a policy that was not trained for it."""
 INTRO = """
 # The zoo
 
@@ -59,7 +61,8 @@ package. Every command that takes a policy takes one by the name of its card:
   quadrotor*, with 1000 random vehicles that the training did not draw. The [tasks](tasks.md) say what counts.
 - **Under stress** the vehicle, the air or the sensors are not those of the file: one difference in each
   [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
-  the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them.
+  the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them. *Not in training* are rows
+  from [laws](robustness.md#laws-that-no-training-draws-from) that no training draws from.
 - **Pictures** show the first starts of `e2efly eval`: 12, or 6 where the policy sees. **Videos** show one of
   these flights, from a camera behind the vehicle. The blue ring is around the place where the policy is told to be.
 - **Training curves** show the success of the evaluations on the way, as `TASK.curve.csv` beside the policy has it.
@@ -80,11 +83,11 @@ def percent(share: float) -> str:
     return f"{int(1000 * share + 1e-6) / 10:.1f} %"
 
 
-def limits(about: dict[str, Any]) -> list[str]:
-    """The worst rows of the stress, each a line of the table."""
-    rows = {name: share for name, share in about.get("stress", {}).items() if name not in ("nominal", "all at once")}
+def limits(about: dict[str, Any], kind: str = "stress", called: str = "under stress") -> list[str]:
+    """The worst rows of a kind of the stress, each a line of the table."""
+    rows = {name: share for name, share in about.get(kind, {}).items() if name not in ("nominal", "all at once")}
     worst = sorted(rows.items(), key=lambda row: row[1])[:WORST]
-    return [f"| under stress: {name} | {percent(share)} |" for name, share in worst if share < 1.0]
+    return [f"| {called}: {name} | {percent(share)} |" for name, share in worst if share < 1.0]
 
 
 def flies_by(policy: Policy) -> str:
@@ -143,6 +146,10 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
         lines += limits(about) or ["| under stress: every other row | 100.0 % |"]
     else:
         lines.append("| under stress | not measured row by row |")
+    if laws := about.get("untrained"):
+        many = sum(share >= UNTRAINED_ENOUGH for share in laws.values())
+        lines.append(f"| not in training: rows at {percent(UNTRAINED_ENOUGH)} or more | {many} of {len(laws)} |")
+        lines += limits(about, "untrained", "not in training")
     lines.append(f"| flies by | {flies_by(load_policy(policy))} |")
     lines += [f"| camera {image.name} | {image.mount} |" for image in load_policy(policy).contract.images]
     if courses := load_policy(policy).contract.courses:

@@ -222,6 +222,8 @@ def test_limits_are_the_worst_rows_first() -> None:
         "| under stress: e | 80.0 % |",
     ]
     assert limits({}) == []
+    untrained = {"untrained": {"x": 0.5, "y": 1.0}}
+    assert limits(untrained, "untrained", "not in training") == ["| not in training: x | 50.0 % |"]
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)

@@ -25,6 +25,7 @@ from e2efly.tasks import TASKS
 from e2efly.tasks.route import usual_route
 from e2efly.validation import evaluation
 from e2efly.validation.stress import stress
+from e2efly.validation.stress_laws import LAWS
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import vehicle_file, vehicle_names
 from tests.conftest import QUICK, NetworkTrace
@@ -85,6 +86,7 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     for vehicle, task in robust:
         stated = contents()[vehicle][task]["stress"]
         assert set(stated) == set(rows_for(TASKS[task].cameras))
+        assert set(contents()[vehicle][task].get("untrained", LAWS)) == set(LAWS)
     for vehicle in [vehicle for vehicle, task in robust if task == "race"]:
         rows = ("mass x1.25", "delay +40 ms", "thrust x0.8")
         report = stress("race", 60, rows=rows, vehicle=vehicle, seed=123)

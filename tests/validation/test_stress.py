@@ -146,6 +146,7 @@ def test_the_nominal_row_is_the_evaluation() -> None:
     a, b = plain.flown["hover"], report.flown["nominal"]["hover"]
     np.testing.assert_array_equal(a.success, b.success)
     np.testing.assert_allclose(a.final_error, b.final_error, atol=2e-4)
+    assert (report.trained.success, report.untrained.success) == (report.success, {})
     heavy = report.flown["mass x1.25"]["hover"]
     assert np.mean(heavy.final_error) > np.mean(b.final_error)
 
@@ -153,10 +154,12 @@ def test_the_nominal_row_is_the_evaluation() -> None:
 @pytest.mark.whole
 def test_the_command_reports_and_judges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, plots = tmp_path / "stress.json", tmp_path / "plots"
-    asked = ["eval", "hover", "--stress", "--rows", "nominal", "delay +20 ms", "--episodes", "20"]
+    asked = ["eval", "hover", "--stress", "--rows", "bent propeller", "nominal", "delay +20 ms", "--episodes", "20"]
     assert run([*asked, "--json", str(out), "--plots", str(plots), "--least", "0.9"]) == 0
-    rows = json.loads(out.read_text())["stress"]
+    said = json.loads(out.read_text())
+    rows = said["stress"]
     assert list(rows) == ["nominal", "delay +20 ms"]
+    assert list(said["untrained"]) == ["bent propeller"]
     assert rows["nominal"]["hover"]["episodes"] == 20
     assert (plots / "stress.png").stat().st_size > 10_000
     assert "delay +20 ms" in capsys.readouterr().out

@@ -15,6 +15,7 @@ from e2efly.validation.plant_stress import lacking, realities, stress
 from e2efly.validation.plants import find_plant
 from e2efly.validation.stress import Report, draws
 from e2efly.validation.stress import stress as in_training
+from e2efly.validation.stress_laws import LAWS
 from e2efly.vehicles.loading import load_vehicle
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "07_own_plant.py"
@@ -93,15 +94,21 @@ def test_the_command_reports_names_what_is_left_out_and_judges(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report = tmp_path / "report.json"
-    asked = ["validate", "hover", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "2", "--out"]
+    asked = ["validate", "hover", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "1", "--out"]
     assert run([*asked, str(tmp_path), "--json", str(report), "--least", "0.5"]) == 0
     said = json.loads(report.read_text())
-    assert set(said["stress"]) | set(said["left_out"]) == set(BLIND)
+    assert set(said["stress"]) | set(said["untrained"]) | set(said["left_out"]) == {*BLIND, *LAWS}
     assert "nominal" in said["stress"]
+    between = {name for name, law in LAWS.items() if not law.alters}
+    assert set(said["untrained"]) == between  # a mass point has what lies between plant and policy
     assert said["left_out"]["mass x1.25"] == "mass"
     assert said["plant"] == "point_mass"
     out = " ".join(capsys.readouterr().out.split())
     assert "Left out: mass x1.25; point_mass cannot change mass" in out
+    assert "Left out: payload falls off; point_mass cannot change mass in flight" in out
+    trained, untrained = out.split("Rows from laws that no training draws from")
+    assert "delay +20 ms" in trained
+    assert "poses held in bursts" in untrained.split("Left out")[0]
     assert (tmp_path / "point_mass_stress.png").stat().st_size > 10_000
 
 

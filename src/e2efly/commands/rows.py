@@ -1,4 +1,4 @@
-"""What `eval --stress` and `validate --stress` share: the check of their options, the table, the report."""
+"""What `eval --stress` and `validate --stress` share: the check of their options, the tables, the report."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,10 @@ from e2efly.config.storage import write_json
 
 if TYPE_CHECKING:
     from e2efly.validation.stress import Report
+
+
+TRAINED, UNTRAINED = "Rows that trainings draw from", "Rows from laws that no training draws from"
+"""The headings of the two tables."""
 
 
 def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> None:
@@ -26,13 +30,13 @@ def check_stress(stress: bool, rows: tuple[str, ...], least: float | None) -> No
         return
     if least is not None and not 0 <= least <= 1:  # true for NaN
         raise ValueError(f"--least is {least}; accepted: 0 to 1")
-    from e2efly.environment.stress_rows import check_rows
+    from e2efly.validation.stress import check_rows
 
     check_rows(rows)
 
 
 def report_stress(found: "Report", console: Console, json: Path | None, plot: Path, least: float | None) -> int:
-    """Print the table; write the report and the plot.
+    """Print a table of each kind of rows; write the report and the plot.
 
     Args:
         found: the results of the policy in each row.
@@ -48,7 +52,10 @@ def report_stress(found: "Report", console: Console, json: Path | None, plot: Pa
 
     for note in found.candidate.notes:
         console.print(note, style="dim")
-    console.print(_table(found))
+    for told, block in ((TRAINED, found.trained), (UNTRAINED, found.untrained)):
+        if block.flown:
+            console.print(told, style="bold")
+            console.print(_table(block))
     for row, lack in found.left_out.items():
         console.print(f"Left out: {row}; {found.plant} cannot change {lack}", style="dim")
     if json:

@@ -506,6 +506,10 @@ class Env:
         return latency.delayed_state(state.past, state.observation_latency, self.control_period)
 
     def _observe(self, state: EnvState) -> Float[Array, "n o"]:
+        return self.shown(state, self.sensed(state))
+
+    def sensed(self, state: EnvState) -> State:
+        """The motion that is observed of a state, with its age and its errors."""
         seen = self._measured(state)
         if state.estimate is not None:
             seen = state.estimate.shown(seen)
@@ -513,6 +517,10 @@ class Env:
             seen = dataclasses.replace(seen, position=seen.position + state.disturbance.drift)
         if self.noise is not None:
             seen = add_noise(self.noise, state.key_of(SEEN), seen)
+        return seen
+
+    def shown(self, state: EnvState, seen: State) -> Float[Array, "n o"]:
+        """The observation of a state whose observed motion is `seen`."""
         known = Known(seen, state.imu, state.actions[:, : self.seen_actions])
         own = (row.value(known) for row in self._own)
         return jnp.concatenate([self.task.observe(state.memory, state.time, seen), *own], axis=-1)

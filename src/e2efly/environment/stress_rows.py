@@ -15,7 +15,6 @@ import jax
 import numpy as np
 
 from e2efly.config import CameraConfig, EstimateConfig, LinkConfig, NoiseConfig
-from e2efly.config.names import unknown
 from e2efly.environment.disturbance import Disturbance
 from e2efly.environment.env_state import EnvState
 from e2efly.environment.environment import Env
@@ -280,17 +279,6 @@ def with_longer_queue(env: Env) -> Env:
     return dataclasses.replace(env, queue=max(env.queue, latest + 1), past=max(env.past, past))
 
 
-def check_rows(rows: tuple[str, ...]) -> None:
-    """Refuse a row that does not exist.
-
-    Raises:
-        ValueError: naming it, the nearest name and all known names.
-    """
-    for name in rows:
-        if name not in ROWS:
-            raise ValueError(unknown("stress", name, tuple(ROWS)))
-
-
 def check_seen(rows: tuple[str, ...], cameras: tuple[CameraConfig, ...]) -> None:
     """Refuse a row for cameras that a policy does not have.
 
@@ -298,7 +286,7 @@ def check_seen(rows: tuple[str, ...], cameras: tuple[CameraConfig, ...]) -> None
         ValueError: naming it, what the policy sees, and the rows that are accepted.
     """
     for name in rows:
-        if not ROWS[name].camera.fits(cameras):
+        if name in ROWS and not ROWS[name].camera.fits(cameras):
             seen = " and ".join(camera.sees for camera in cameras) or "nothing"
             raise ValueError(
                 f"--rows has {name!r}, but the policy sees {seen}; accepted: "

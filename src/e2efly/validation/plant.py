@@ -253,8 +253,9 @@ class Delay:
         return Delay(latency, acting)
 
     def send(self, command: np.ndarray, now: float) -> "Delay":
-        """Send a command, (4,), at `now`, s."""
-        return replace(self, coming=(*self.coming, (now + self.latency, command)))
+        """Send a command, (4,), at `now`, s. With a latency that has fallen, it overtakes what would act later."""
+        due = now + self.latency
+        return replace(self, coming=(*(one for one in self.coming if one[0] < due), (due, command)))
 
     def until(self, now: float, end: float) -> tuple["Delay", list[tuple[np.ndarray, float]]]:
         """Let time pass from `now` to `end`, s.

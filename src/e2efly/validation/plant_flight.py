@@ -1,5 +1,6 @@
 """Fly a policy on a plant, and record it. Imports no JAX."""
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,8 +10,10 @@ import numpy as np
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.policy.goal import Body
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
+from e2efly.validation.law_step import LawMemory, LawStep, air_of, arrived, observed
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.reality import Air
+from e2efly.validation.stress_laws import LATEST
 from e2efly.vehicles.gravity import GRAVITY
 
 
@@ -73,6 +76,7 @@ def fly(
     air: Air | None = None,
     sample: float | None = None,
     images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
+    law: LawStep | None = None,
 ) -> Trajectory:
     """Fly from one start until the time is over, or the task is done or has failed.
 
@@ -85,6 +89,7 @@ def fly(
         air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
         sample: longest time between two samples, s. None: no samples are kept.
         images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
+        law: the control steps of the flight under a law of the stress.
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
@@ -101,6 +106,8 @@ def fly(
     delay = Delay.of(latency, contract.action.command(np.array(contract.hover_action)))
     plant.reset(start)
     states, decisions, fault = [plant.state], [], ""
+    moved = law is not None and law.disturbs
+    felt = None if law is None else LawMemory.of(states[0], np.array(contract.hover_action), period, LATEST)
     samples = [] if sample is None else [FlightSample.of(plant, 0.0)]
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
@@ -109,18 +116,28 @@ def fly(
             truth = states[-1].odometry(now)
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
             seen = None if air is None else air.seen(k, truth)
+            if law is not None and felt is not None:
+                seen, felt = observed(law.at(k), felt, truth, period)
+                measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
             shown = () if images is None else images(k, states)
             memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown)
             if memory.done or memory.failure:
                 break
-            delay, parts = delay.send(decision.command, now).until(now, then)
+            command = decision.command
+            if law is not None and felt is not None:
+                arrives, felt = arrived(law.at(k), felt, decision.action)
+                command = contract.action.command(arrives)
+                delay = dataclasses.replace(delay, latency=latency + float(law.later[k]))
+                if moved:
+                    plant.disturb(*air_of(law.at(k), states[-1]))
+            delay, parts = delay.send(command, now).until(now, then)
             if disturbed and air is not None:
                 plant.disturb(air.wind[k], air.rotor_share[k])
             at = now
-            for command, seconds in parts:
+            for acting, seconds in parts:
                 count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
                 for _ in range(count):
-                    plant.step(command, seconds / count)
+                    plant.step(acting, seconds / count)
                     at += seconds / count
                     if sample is not None:
                         samples.append(FlightSample.of(plant, at))

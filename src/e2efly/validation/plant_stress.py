@@ -1,5 +1,6 @@
 """Fly the rows of `e2efly.validation.stress` on another plant. `e2efly validate --stress` does this."""
 
+import dataclasses
 import os
 from collections.abc import Callable
 from functools import partial
@@ -11,22 +12,24 @@ import numpy as np
 
 from e2efly.config.budget import check_memory
 from e2efly.environment import UNSEEN, disturbance, random_key
-from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for
+from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
+from e2efly.validation.law_step import BODY
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_validation import SAMPLE, flyable, plant_name
 from e2efly.validation.reality import Air, Reality, check_realities
 from e2efly.validation.starts import draw_starts
-from e2efly.validation.stress import Report, draws
+from e2efly.validation.stress import Report, check_rows, draws, every_row, laws_of
+from e2efly.validation.stress_laws import LAWS, StressLaw
 from e2efly.validation.task_verdict import Verdicts, judge
 from e2efly.vehicles.vehicle import Controller, Vehicle
 
 FLIGHTS = 10
 """Default number of starts per row and criterion. Each takes a second on MuJoCo or through the firmware."""
-AIR = 19 * 8
-"""Memory of the air of one control step, bytes."""
+AIR = 45 * 8
+"""Memory of the air, or of a law, in one control step, bytes."""
 
 
 def stress(
@@ -68,8 +71,8 @@ def stress(
     prepare("cpu")  # the plants compute on the CPU, one vehicle at a time
     found, kind, own = flyable(policy, plant, vehicle, controller, baseline=baseline)
     check_seen(rows, found.env.cameras)
-    known = rows_for(found.env.cameras)
-    left_out = {row: lack for row in known if (lack := lacking(kind, ROWS[row]))}
+    known = every_row(found.env.cameras)
+    left_out = {row: lack for row in known if (lack := lacking(kind, ROWS.get(row) or LAWS[row]))}
     if refused := [row for row in rows if row in left_out]:
         raise ValueError(
             f"--rows has {refused[0]!r}, but plant {kind.name!r} cannot change {left_out[refused[0]]}; accepted: "
@@ -89,8 +92,10 @@ def stress(
         begins = list(zip(starts.states, starts.courses, strict=True))
         asked = []
         for row in chosen:
-            drawn = draws(ROWS[row], flown, seed, episodes)
+            drawn = draws(ROWS.get(row, ROWS["nominal"]), flown, seed, episodes)
             meets = realities(drawn, flown, seed, steps, env.control_period)
+            if row in LAWS:
+                meets = under_law(LAWS[row], meets, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
             asked += [FleetFlight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
         mission = FleetMission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
@@ -101,7 +106,7 @@ def stress(
     return Report(found, seed, report, plant=kind.name, left_out={} if rows else left_out)
 
 
-def lacking(kind: type[Plant], row: StressRow) -> str:
+def lacking(kind: type[Plant], row: StressRow | StressLaw) -> str:
     """The changes that a row requires and a plant cannot make. Empty: there are none."""
     return ", ".join(sorted(row.alters - kind.alters))
 
@@ -125,6 +130,23 @@ def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: floa
             None if calm else Air(wind[:, i], share[:, i], error[:, i]),
         )
         for i in range(n)
+    ]
+
+
+def under_law(
+    law: StressLaw, meets: list[Reality], vehicle: Vehicle, seed: int, steps: int, period: float
+) -> list[Reality]:
+    """The same flights under a law. The vehicle is the nominal one."""
+    whole = laws_of(law, vehicle, seed, len(meets), steps, period)
+    first = whole.at(0)
+    largest = first.ceiling * vehicle.thrust_range[1]
+    of_body = {name: getattr(first, name) for name in BODY} | {"rotor_thrust_max": largest}
+    of_body = {name: values for name, values in of_body.items() if name in law.alters}
+    return [
+        dataclasses.replace(
+            met, body=dataclasses.replace(met.body, **{name: x[i] for name, x in of_body.items()}), law=whole.of(i)
+        )
+        for i, met in enumerate(meets)
     ]
 
 

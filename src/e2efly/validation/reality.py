@@ -11,6 +11,7 @@ import numpy as np
 
 from e2efly.control import Quat
 from e2efly.policy.odometry import Odometry
+from e2efly.validation.law_step import LawStep
 from e2efly.validation.plant import Plant
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
@@ -57,6 +58,13 @@ class Reality:
     """Whether the mixer clips each rotor by itself, and does not give attitude priority over thrust."""
     air: Air | None = None
     """None: still air, full thrust, and a state without errors."""
+    law: LawStep | None = None
+    """The control steps of the flight under a law. None: there is none."""
+
+    @property
+    def disturbs(self) -> bool:
+        """Whether there is wind, or another thrust than the body's."""
+        return any(each is not None and each.disturbs for each in (self.air, self.law))
 
 
 def altered(body: Vehicle, believed: Vehicle) -> frozenset[str]:
@@ -76,11 +84,7 @@ def check_realities(plant: type[Plant], believed: Vehicle, realities: Sequence[R
     """
     wanted = set().union(*(altered(reality.body, believed) for reality in realities))
     wanted |= {"plain_mixer"} if any(reality.plain_mixer for reality in realities) else set()
-    wanted |= (
-        {"wind", "rotor_share"}
-        if any(reality.air is not None and reality.air.disturbs for reality in realities)
-        else set()
-    )
+    wanted |= {"wind", "rotor_share"} if any(reality.disturbs for reality in realities) else set()
     if beyond := sorted(wanted - plant.alters):
         raise ValueError(
             f"plant {plant.name!r} cannot change {', '.join(beyond)} without its flight controller's knowledge; "

@@ -1,20 +1,35 @@
-"""Results of a policy in the rows of the stress, with one compiled program."""
+"""Results of a policy in the rows of the stress: those that trainings draw from, and laws that none draws from.
 
+One compiled program flies all rows of the first kind, and one all of the second.
+"""
+
+import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
-from e2efly.environment import UNSEEN, random_key
-from e2efly.environment.episodes import Episodes, run_stepwise, summary
-from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_rows, check_seen, rows_for, with_longer_queue
-from e2efly.simulation.device import prepare
+from e2efly.config import CameraConfig
+from e2efly.config.names import unknown
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.episodes import Act, Episodes, EpisodesUnderWay, run_stepwise, summary
+from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen, rows_for, with_longer_queue
+from e2efly.simulation.device import fast_compile, prepare, wide_vectors
+from e2efly.simulation.physics import RateLoop
+from e2efly.simulation.physics.body import rotor_speed_for
 from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate
+from e2efly.validation.law_step import BODY, LawMemory, LawStep, air_of, arrived, observed
+from e2efly.validation.stress_laws import LATEST, LAWS, LawSetting, StressLaw, steps_of
 from e2efly.vehicles.vehicle import Controller, Vehicle
+
+for _kind in (LawStep, LawMemory):
+    jax.tree_util.register_dataclass(_kind, data_fields=[f.name for f in dataclasses.fields(_kind)], meta_fields=[])
 
 
 @dataclass(frozen=True)
@@ -36,19 +51,53 @@ class Report:
         return {row: min(float(np.mean(e.success)) for e in criteria.values()) for row, criteria in self.flown.items()}
 
     @property
+    def trained(self) -> "Report":
+        """The report of the rows that trainings draw from."""
+        return self._only(lambda row: row not in LAWS)
+
+    @property
+    def untrained(self) -> "Report":
+        """The report of the rows from laws that no training draws from."""
+        return self._only(lambda row: row in LAWS)
+
+    def _only(self, kept: Callable[[str], bool]) -> "Report":
+        flown, left_out = ({row: x for row, x in of.items() if kept(row)} for of in (self.flown, self.left_out))
+        return dataclasses.replace(self, flown=flown, left_out=left_out)
+
+    @property
     def worst(self) -> str:
         """The row with the lowest success rate."""
         return min(self.success, key=lambda row: self.success[row])
 
     def as_json(self) -> dict[str, Any]:
-        """The report that `--stress --json` writes: a summary by row and criterion."""
+        """The report that `--stress --json` writes: a summary by row and criterion, of each kind of rows."""
+        blocks = {"stress": self.trained.flown, "untrained": self.untrained.flown}
         return {
             **self.candidate.as_json(),
             "plant": self.plant,
             "seed": self.seed,
             "left_out": dict(self.left_out),
-            "stress": {row: {name: summary(e) for name, e in found.items()} for row, found in self.flown.items()},
+            **{
+                kind: {row: {name: summary(e) for name, e in found.items()} for row, found in flown.items()}
+                for kind, flown in blocks.items()
+            },
         }
+
+
+def every_row(cameras: tuple[CameraConfig, ...]) -> tuple[str, ...]:
+    """The names of all rows that apply to a policy with these cameras, in the order of the tables."""
+    return (*rows_for(cameras), *LAWS)
+
+
+def check_rows(rows: tuple[str, ...]) -> None:
+    """Refuse a row that does not exist.
+
+    Raises:
+        ValueError: naming it, the nearest name and all known names.
+    """
+    for name in rows:
+        if name not in ROWS and name not in LAWS:
+            raise ValueError(unknown("stress", name, (*ROWS, *LAWS)))
 
 
 def stress(
@@ -62,7 +111,7 @@ def stress(
     device: str | None = None,
     baseline: str | None = None,
 ) -> Report:
-    """Fly a policy's file in every row of `ROWS`, from the unseen starts of `evaluate`.
+    """Fly a policy's file in every row of `ROWS` and under every law of `LAWS`, from the unseen starts of `evaluate`.
 
     Args:
         policy: a run directory, a policy.onnx, or the name of a task: the zoo's policy of it.
@@ -89,7 +138,7 @@ def stress(
             f"{found.vehicle}, about which the rows lie"
         )
     check_seen(rows, found.env.cameras)
-    return Report(found, seed, fly_rows(found, rows or rows_for(found.env.cameras), episodes, seed))
+    return Report(found, seed, fly_rows(found, rows or every_row(found.env.cameras), episodes, seed))
 
 
 def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
@@ -102,20 +151,115 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
         for row in rows:
             parts = []
             for i in batches:
-                draw = Draw.of(ROWS[row], env.physics.flown, _generator(ROWS[row], seed, i), BATCH)
+                draw = draw_of(ROWS.get(row, ROWS["nominal"]), env.physics.flown, seed, i)
                 draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
                 key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
-                altered = partial(draw.state, env)
-                parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, altered)[0])
+                if row in LAWS:
+                    law = law_of(LAWS[row], found.flown.body, seed, i, steps, env.control_period)
+                    parts.append(fly_law(draw.env(env), act, key, draw, law, settle))
+                else:
+                    altered = partial(draw.state, env)
+                    parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, altered)[0])
             flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
 
 
+def fly_law(env: Env, act: Act, key: Array, draw: Draw, law: LawStep, settle: float) -> Episodes:
+    """`run_stepwise` for `BATCH` episodes under a law, whose control steps are all of the longest episode.
+
+    Everything else is as in the nominal row, which is `draw`.
+    """
+    begin, after = _programs(bool(env.cameras))
+    flight, felt, sent = begin(env, key, draw, law.at(0))
+    memory = act.begin(BATCH)
+    for k in range(env.episode_steps):
+        seen = tuple(np.asarray(image) for image in flight.state.images)
+        action, memory = act.act(np.asarray(flight.observation), seen, memory)
+        flight, felt, sent = after(env, flight, action, settle, draw, (law.at(k), law.at(k + 1)), felt, sent)
+        if np.all(flight.over):
+            break
+    return jax.tree.map(np.asarray, flight.episodes(env))
+
+
+@cache
+def _programs(seeing: bool) -> tuple[Callable, Callable]:
+    """The compiled programs for `BATCH` episodes under a law: their start and a step."""
+
+    def begin(env: Env, key: Array, draw: Draw, now: LawStep) -> tuple[EpisodesUnderWay, LawMemory, Array]:
+        state, _ = env.reset(key, BATCH)
+        state = draw.state(env, state)
+        vehicle = dataclasses.replace(env.physics.flown, gyro_time_constant=now.gyro_time_constant)
+        loop = RateLoop.at_rest(vehicle, state.vehicle.body_rate)  # with a filter, which may be none
+        state = dataclasses.replace(state, vehicle=dataclasses.replace(state.vehicle, rate_loop=loop))
+        felt = LawMemory.of(env.sensed(state), state.actions[:, 0], env.control_period, LATEST)
+        seen, felt = observed(now, felt, env.sensed(state), env.control_period)
+        return EpisodesUnderWay.of(state, env.shown(state, seen)), felt, state.actions
+
+    def after(
+        env: Env,
+        flight: EpisodesUnderWay,
+        action: Array,
+        settle: Any,
+        draw: Draw,
+        steps: tuple[LawStep, LawStep],
+        felt: LawMemory,
+        sent: Array,
+    ) -> tuple[EpisodesUnderWay, LawMemory, Array]:
+        """`EpisodesUnderWay.after`, with the past actions that the policy has sent, which need not have arrived."""
+        (now, then), state = steps, flight.state
+        arrives, felt = arrived(now, felt, action)
+        wind, share = air_of(now, state.vehicle)
+        plant: dict[str, Any] = {**draw.plant, **{name: getattr(now, name) for name in BODY}}
+        plant["mass"] = plant["mass"] * now.mass
+        plant["rotor_position"] = plant["rotor_position"] - now.shift[:, None]
+        disturbance = dataclasses.replace(draw.disturbance, rotor_share=share)
+        latency = draw.latency + now.later
+        state = dataclasses.replace(state, plant=plant, wind=wind, disturbance=disturbance, action_latency=latency)
+        flown = dataclasses.replace(env, physics=dataclasses.replace(env.physics, full_speed=_full_speed(env, now)))
+        flight = dataclasses.replace(flight, state=state).after(flown, arrives, settle)
+        sent = jnp.concatenate([action[:, None], sent[:, :-1]], axis=1)
+        state = flight.state
+        seen, felt = observed(then, felt, env.sensed(state), env.control_period)
+        shown = dataclasses.replace(state, actions=sent)
+        if state.imu is not None:
+            gyroscope = state.imu.gyroscope + then.error[:, 9:12]
+            shown = dataclasses.replace(shown, imu=dataclasses.replace(state.imu, gyroscope=gyroscope))
+        return dataclasses.replace(flight, observation=env.shown(shown, seen)), felt, sent
+
+    options = wide_vectors(BATCH) | ({} if seeing else fast_compile())
+    first, further = (jax.jit(program, compiler_options=options) for program in (begin, after))
+    return first, further
+
+
+def _full_speed(env: Env, law: LawStep) -> Array:
+    """The largest speed of the rotors, (n,) rad/s, for a ceiling of their thrust. Infinite: only the mixer's."""
+    usual = jnp.inf if env.physics.full_speed is None else env.physics.full_speed
+    thrust = env.physics.mixer.thrust_max * law.ceiling
+    lower = rotor_speed_for(env.physics.flown, (thrust, thrust, thrust, thrust))[0]
+    return jnp.where(law.ceiling < 1, jnp.minimum(lower, usual), usual)
+
+
+def laws_of(law: StressLaw, vehicle: Vehicle, seed: int, n: int, steps: int, period: float) -> LawStep:
+    """The control steps of the first n flights under a law. They do not depend on the number of flights."""
+    batches = [law_of(law, vehicle, seed, i, steps, period) for i in range(-(-n // BATCH))]
+    return jax.tree.map(
+        lambda *x: np.concatenate([part[:, : n - i * BATCH] for i, part in enumerate(x)], axis=1), *batches
+    )
+
+
+def law_of(law: StressLaw, vehicle: Vehicle, seed: int, batch: int, steps: int, period: float) -> LawStep:
+    """The control steps of a law for a batch of the starts of a seed. The vehicle is the nominal one."""
+    rng = np.random.default_rng([seed, UNSEEN, batch, len(LAWS), list(LAWS).index(law.name)])
+    return steps_of(law, LawSetting(vehicle, rng, BATCH, steps, period))
+
+
 def draws(row: StressRow, vehicle: Vehicle, seed: int, n: int) -> Draw:
     """The first n episodes of a row for the seed of the starts. They do not depend on the number of episodes."""
-    batches = [Draw.of(row, vehicle, _generator(row, seed, i), BATCH) for i in range(-(-n // BATCH))]
+    batches = [draw_of(row, vehicle, seed, i) for i in range(-(-n // BATCH))]
     return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 
 
-def _generator(row: StressRow, seed: int, batch: int) -> np.random.Generator:
-    return np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])
+def draw_of(row: StressRow, vehicle: Vehicle, seed: int, batch: int) -> Draw:
+    """A batch of episodes of a row."""
+    rng = np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])
+    return Draw.of(row, vehicle, rng, BATCH)
