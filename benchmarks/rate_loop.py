@@ -93,7 +93,7 @@ def main() -> None:
     ours, ticks = trained(vehicle, commands)
     rows = []
     for name, hz in (
-        (f"held for {1e3 / ticks:.2f} ms, a step of the training", ticks),
+        (f"held for {1e3 / ticks:.2f} ms, a training step", ticks),
         ("1 kHz", 1000.0),
         ("4 kHz", 4000.0),
     ):
