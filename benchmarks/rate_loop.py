@@ -1,9 +1,9 @@
-"""What the held rate loop costs: positions of the training's physics beside those of an independent plant.
+"""What a held rate loop costs: positions of the training's physics beside those of an independent plant.
 
     python benchmarks/rate_loop.py [--vehicle vis_r] [--flights 100] [--json FILE]
 
 The plant is `examples/09_own_physics.py`, in NumPy and float64, which shares no code with the training's physics. It is
-integrated by RK4 in steps of at most 0.25 ms. Its rate loop runs as often as that of the training, or at 1 or 4 kHz,
+integrated by RK4 in steps of at most 0.25 ms. Its rate loop runs once in a step of the training, or at 1 or 4 kHz,
 and its rotor commands hold in between. Each flight begins at hover and has 2 s of violent `ctbr` commands: every 0.2 s
 another collective thrust, 0.3 to 1.8 g, and body rates anywhere within the vehicle's limits. There is no delay.
 """
@@ -73,7 +73,7 @@ def flown(vehicle: Any, commands: np.ndarray, loop_hz: float) -> np.ndarray:
 
 
 def trained(vehicle: Any, commands: np.ndarray) -> tuple[np.ndarray, float]:
-    """Positions at the end in the training's physics, (flights, 3) m, and the rate of its rate loop, Hz."""
+    """Positions at the end in the training's physics, (flights, 3) m, and the rate of its steps, Hz."""
     physics, n = Physics.of(vehicle), commands.shape[1]
     hover, still = np.full((n, 4), vehicle.hover_rotor_speed, np.float32), np.zeros((n, 3), np.float32)
     state = State(still, still, np.tile(np.float32([1, 0, 0, 0]), (n, 1)), still, hover)
@@ -92,7 +92,11 @@ def main() -> None:
     commands = sequences(vehicle, options.flights)
     ours, ticks = trained(vehicle, commands)
     rows = []
-    for name, hz in ((f"held for {1e3 / ticks:.2f} ms, as in training", ticks), ("1 kHz", 1000.0), ("4 kHz", 4000.0)):
+    for name, hz in (
+        (f"held for {1e3 / ticks:.2f} ms, a training step", ticks),
+        ("1 kHz", 1000.0),
+        ("4 kHz", 4000.0),
+    ):
         off = 1e3 * np.linalg.norm(ours - flown(vehicle, commands, hz), axis=-1)
         figures = {"mean": off.mean(), "median": np.median(off), "largest": off.max()}
         rows.append({"rate loop of the plant": name} | {f"{k}, mm": f"{v:.3g}" for k, v in figures.items()})

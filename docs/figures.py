@@ -31,7 +31,7 @@ GOALS = {
 """Rows of the table of README.md."""
 TITLES = {
     "rates": "Rates",
-    "rate_loop": "What the held rate loop costs",
+    "rate_loop": "What a held rate loop costs",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
     "visual_tasks": "Tasks flown by sight: trained, then flown under stress from unseen starts in unseen worlds",

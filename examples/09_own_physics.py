@@ -13,6 +13,7 @@ from e2efly.policy.loader import Policy
 from e2efly.vehicles.vehicle import Vehicle
 
 LARGEST_STEP = 0.005
+HOLD = 0.00025
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
@@ -80,10 +81,11 @@ class Physics:
 
     def substep(self, m: Motion, command: np.ndarray, dt: float) -> Motion:
         """One step of Kutta's third-order method, with the exact solution for the rotors' lag."""
-        goal, left = self.wanted(m, command), np.exp(-dt / 2 / self.v.motor_time_constant)
+        a = self.rate(m, m.rotor_speed)
+        ahead = m.plus(a, (dt - min(HOLD, dt)) / 2)
+        goal, left = self.wanted(ahead, command), np.exp(-dt / 2 / self.v.motor_time_constant)
         middle = goal + (m.rotor_speed - goal) * left
         end = goal + (middle - goal) * left
-        a = self.rate(m, m.rotor_speed)
         b = self.rate(m.plus(a, dt / 2), middle)
         c = self.rate(m.plus(b, 2 * dt).plus(a, -dt), end)
         m = m.plus(a, dt / 6).plus(b, 4 * dt / 6).plus(c, dt / 6)

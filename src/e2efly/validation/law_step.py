@@ -29,6 +29,8 @@ class LawStep:
     Of a whole flight, each has a leading axis of its control steps.
     """
 
+    lag: Any
+    """(4,) time constants of the low-passes of the observed position, velocity, attitude and body rate, s."""
     error: Any
     """(12,) added to what is observed: position, m; velocity, m/s; half of a small rotation about the body axes, rad;
     body rate, rad/s."""
@@ -45,7 +47,7 @@ class LawStep:
     grain: Any
     """(4,) steps in which position, m, velocity, m/s, quaternion and body rate, rad/s, are observed. 0: none."""
     held: Any
-    """() 1: the last observation is shown again. 0: it is new."""
+    """() 1: the last pose and velocity are shown again. 0: they are new. The body rates go on."""
     play: Any
     """() change of an action, in [-1, 1], up to which it has no effect."""
     command_grain: Any
@@ -93,6 +95,8 @@ class LawStep:
 class LawMemory:
     """What a law remembers from one control step to the next."""
 
+    smooth: tuple[Any, Any, Any, Any]
+    """The last low-passed position, velocity, quaternion and body rate."""
     velocity: Any
     """(..., k, 3) the last true velocities, newest first, m/s."""
     position: Any
@@ -107,7 +111,8 @@ class LawMemory:
         """The memory before the first control step, for velocities that are at most `oldest` s old."""
         p, v = motion.position, motion.velocity
         past = namespace(v).stack([v] * (math.ceil(oldest / period - 1e-6) + 1), axis=-2)
-        return LawMemory(past, p - v * period, (p, v, motion.quaternion, motion.body_rate), acting)
+        known = (p, v, motion.quaternion, motion.body_rate)
+        return LawMemory(known, past, p - v * period, known, acting)
 
 
 def observed(law: LawStep, memory: LawMemory, motion: Any, period: float) -> tuple[Any, LawMemory]:
@@ -121,23 +126,28 @@ def observed(law: LawStep, memory: LawMemory, motion: Any, period: float) -> tup
         period: the control period, s.
     """
     xp, error = namespace(motion.position, law.error), law.error
-    position = motion.position * (1 + law.stretch[..., None]) + error[..., 0:3]
     past = xp.concatenate([motion.velocity[..., None, :], memory.velocity[..., :-1, :]], axis=-2)
     weight = xp.maximum(1 - abs(law.velocity_age[..., None] / period - xp.arange(past.shape[-2])), 0)
-    delayed, differences = xp.sum(weight[..., None] * past, axis=-2), (position - memory.position) / period
-    velocity = _chosen(law.derived, differences, delayed) + error[..., 3:6]
+    now = motion.position, xp.sum(weight[..., None] * past, axis=-2), motion.quaternion, motion.body_rate
+    at, speed, turned, rate = smooth = tuple(
+        _low_passed(law.lag[..., i], before, x, period)
+        for i, (before, x) in enumerate(zip(memory.smooth, now, strict=True))
+    )
+    position = at * (1 + law.stretch[..., None]) + error[..., 0:3]
+    differences = (position - memory.position) / period
+    velocity = _chosen(law.derived, differences, speed) + error[..., 3:6]
     pull = Vec3.of((motion.velocity - memory.velocity[..., 0, :]) / period + np.array([0.0, 0.0, GRAVITY], np.float32))
     half = (law.heading + law.heading_by_load * (pull.norm() / GRAVITY - 1)) / 2
     nothing = xp.zeros_like(half)
     small = Quat(xp.ones_like(half), *(error[..., i] for i in (6, 7, 8))).normalized()
-    attitude = Quat(xp.cos(half), nothing, nothing, xp.sin(half)).compose(Quat.of(motion.quaternion)).compose(small)
-    seen = (position, velocity, attitude.stack(), motion.body_rate + error[..., 9:12])
+    attitude = Quat(xp.cos(half), nothing, nothing, xp.sin(half)).compose(Quat.of(turned)).compose(small)
+    seen = (position, velocity, attitude.stack(), rate + error[..., 9:12])
     p, v, q, w = (_coarse(x, law.grain[..., i]) for i, x in enumerate(seen))
     whole = Quat.of(q).normalized().stack()
     q = _chosen(law.grain[..., 2] > 0, whole, q)
-    p, v, q, w = (_chosen(law.held, *pair) for pair in zip(memory.shown, (p, v, q, w), strict=True))
+    p, v, q = (_chosen(law.held, *pair) for pair in zip(memory.shown[:3], (p, v, q), strict=True))
     shown = dataclasses.replace(motion, position=p, velocity=v, quaternion=q, body_rate=w)
-    return shown, dataclasses.replace(memory, velocity=past, position=position, shown=(p, v, q, w))
+    return shown, dataclasses.replace(memory, smooth=smooth, velocity=past, position=position, shown=(p, v, q, w))
 
 
 def arrived(law: LawStep, memory: LawMemory, action: Any) -> tuple[Any, LawMemory]:
@@ -163,6 +173,17 @@ def air_of(law: LawStep, motion: Any) -> tuple[Any, Any]:
     lost = xp.clip(1 - law.inflow * through, *SHARES)
     near = law.cushion / (4 * xp.maximum(height, xp.maximum(law.cushion, 1e-3)))
     return wind, law.share * (lost / (1 - near**2))[..., None]
+
+
+def _low_passed(lag: Any, before: Any, now: Any, dt: float) -> Any:
+    """A value of a first-order low-pass, (..., m), that has met `now` for `dt` s. A quaternion is scaled to length 1."""
+    xp = namespace(lag, now)
+    kept = xp.exp(-dt / xp.maximum(lag, 1e-6))[..., None]
+    if now.shape[-1] != 4:
+        return now + kept * (before - now)
+    same = xp.sum(before * now, axis=-1, keepdims=True) >= 0
+    mixed = Quat.of(now + kept * (xp.where(same, before, -before) - now)).normalized()
+    return _chosen(lag, mixed.stack(), now)
 
 
 def _chosen(which: Any, yes: Any, no: Any) -> Any:

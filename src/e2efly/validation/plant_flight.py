@@ -117,7 +117,7 @@ def fly(
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
             seen = None if air is None else air.seen(k, truth)
             if law is not None and felt is not None:
-                seen, felt = observed(law.at(k), felt, truth, period)
+                seen, felt = observed(law.at(k), felt, truth if seen is None else seen, period)
                 measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
             shown = () if images is None else images(k, states)
             memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown)

@@ -12,17 +12,19 @@ import numpy as np
 
 from e2efly.config.budget import check_memory
 from e2efly.environment import UNSEEN, disturbance, random_key
+from e2efly.environment.lost_commands import EVERY
+from e2efly.environment.pose_errors import BETWEEN_JUMPS, JUMP
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
-from e2efly.validation.law_step import BODY
+from e2efly.validation.law_step import BODY, LawStep
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_validation import SAMPLE, flyable, plant_name
 from e2efly.validation.reality import Air, Reality, check_realities
 from e2efly.validation.starts import draw_starts
 from e2efly.validation.stress import Report, check_rows, draws, every_row, laws_of
-from e2efly.validation.stress_laws import LAWS, StressLaw
+from e2efly.validation.stress_laws import LAWS, LawSetting, StressLaw, steps_of
 from e2efly.validation.task_verdict import Verdicts, judge
 from e2efly.vehicles.vehicle import Controller, Vehicle
 
@@ -94,6 +96,8 @@ def stress(
         for row in chosen:
             drawn = draws(ROWS.get(row, ROWS["nominal"]), flown, seed, episodes)
             meets = realities(drawn, flown, seed, steps, env.control_period)
+            if told := told_law(drawn, flown, seed, steps, env.control_period):
+                meets = [dataclasses.replace(met, law=told.of(i)) for i, met in enumerate(meets)]
             if row in LAWS:
                 meets = under_law(LAWS[row], meets, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
@@ -131,6 +135,29 @@ def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: floa
         )
         for i in range(n)
     ]
+
+
+def told_law(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float) -> LawStep | None:
+    """The errors of the poses and the lost commands of the flights of a row; None: there are none.
+
+    What happens when is another random sequence than that of the training simulator.
+    """
+    e, link, n = drawn.estimate, drawn.link, len(drawn.latency)
+    if not any(np.any(x) for x in (*e.values(), link["dropped"], link["silence"])):
+        return None
+    rng, time = np.random.default_rng([seed, UNSEEN, n, 1]), period * np.arange(steps)[:, None]
+    error = np.zeros((steps, n, 12))
+    error[..., 6:8] = e["turned"][:, 1:] / 2
+    held, wrong, left, off = np.zeros((steps, n)), np.zeros((steps, n)), np.zeros(n), np.zeros(n, bool)
+    for k in range(steps):
+        held[k], wrong[k] = left > 0, off
+        left = np.where(left > 0, left - 1, np.floor((e["hold"] + 1) * rng.uniform(size=n)))
+        off ^= rng.uniform(size=n) < period / np.where(off, JUMP, BETWEEN_JUMPS)
+    error[..., 0:3] = wrong[..., None] * e["jump"]
+    lost = (rng.uniform(size=(steps, n)) < link["dropped"]) | ((time + link["phase"]) % EVERY < link["silence"])
+    still = steps_of(None, LawSetting(vehicle, rng, n, steps, period))
+    lag, heading = (np.broadcast_to(x, (steps, *x.shape)) for x in (e["lag"], e["turned"][:, 0]))
+    return dataclasses.replace(still, lag=lag, error=error, heading=heading, held=held, lost=1.0 * lost)
 
 
 def under_law(

@@ -411,7 +411,7 @@ LAWS: dict[str, StressLaw] = {
 """The rows by name. The position of a row determines what it draws, so new rows are added at the end."""
 
 
-WIDTHS = {"error": 12, "grain": 4, "wind": 3, "shift": 2, "share": 4, "thrust_map": 3}
+WIDTHS = {"lag": 4, "error": 12, "grain": 4, "wind": 3, "shift": 2, "share": 4, "thrust_map": 3}
 """Number of values of the entries of `LawStep` that are vectors."""
 
 

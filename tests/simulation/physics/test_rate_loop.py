@@ -58,7 +58,7 @@ def ticking(vehicle: Vehicle, commands: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["vis_r", "crazyflie"])
 def test_violent_flights_end_where_those_of_a_4_khz_rate_loop_end(name: str) -> None:
-    """Another thrust and other body rates every 0.2 s, for 2 s: 5 mm apart in the mean. Held for a step: 20 times that."""
+    """Another thrust and other body rates every 0.2 s, for 2 s: 5 mm apart in the mean. A held loop: 100 mm."""
     vehicle, rng = load_vehicle(name), np.random.default_rng(5)
     thrust = 9.81 * rng.uniform(0.3, 1.8, (round(SECONDS / CHANGE), FLIGHTS, 1))
     rates = rng.uniform(-1, 1, (*thrust.shape[:2], 3)) * vehicle.body_rate_max
