@@ -34,6 +34,8 @@ VIS_R = load_vehicle("vis_r")
 PERIOD, N, STEPS = 1 / 30, 400, 300
 TIPPING = np.tile(np.array([0.1, 0.2, -0.1, 0.1], np.float32), (BATCH, 1))
 """Actions that tip a vehicle over."""
+FULL = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (BATCH, 1))
+"""Actions of full thrust."""
 BELOW = ("config", "vehicles", "control", "courses", "policy", "tasks", "simulation", "runs", "environment", "learning")
 """Rooms of which a training consists."""
 
@@ -153,10 +155,7 @@ def test_a_flight_under_each_law_is_finite_and_a_law_of_the_vehicle_changes_it(s
         # a policy that does not look is moved by what moves the vehicle alone
         moved = np.abs(flown.final_error - still.final_error).max() > 1e-6
         assert moved == bool(row.alters) or name in MOVES or name in TOO_SHORT, name
-    climbing = (
-        short[0],
-        Act(lambda observation, images, memory: (np.tile(np.float32([1, 0, 0, 0]), (BATCH, 1)), memory)),
-    )
+    climbing = short[0], Act(lambda observation, images, memory: (FULL, memory))
     fastest = {name: under(name, climbing).top_speed.mean() for name in (None, "hot motors", "worn motors")}
     assert max(fastest["hot motors"], fastest["worn motors"]) < fastest[None] - 0.02
 
