@@ -15,7 +15,7 @@ import pytest
 import e2efly
 from e2efly.config import DisturbanceConfig, EnvConfig, ImuConfig, NoiseConfig, RewardConfig
 from e2efly.control import Quat
-from e2efly.environment import Env, random_key
+from e2efly.environment import Env, random_key, stress_rows
 from e2efly.environment.episodes import Act, run_stepwise
 from e2efly.environment.stress_rows import ROWS
 from e2efly.runs import presets
@@ -34,6 +34,8 @@ VIS_R = load_vehicle("vis_r")
 PERIOD, N, STEPS = 1 / 30, 400, 300
 TIPPING = np.tile(np.array([0.1, 0.2, -0.1, 0.1], np.float32), (BATCH, 1))
 """Actions that tip a vehicle over."""
+FULL = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (BATCH, 1))
+"""Actions of full thrust."""
 BELOW = ("config", "vehicles", "control", "courses", "policy", "tasks", "simulation", "runs", "environment", "learning")
 """Rooms of which a training consists."""
 
@@ -153,6 +155,9 @@ def test_a_flight_under_each_law_is_finite_and_a_law_of_the_vehicle_changes_it(s
         # a policy that does not look is moved by what moves the vehicle alone
         moved = np.abs(flown.final_error - still.final_error).max() > 1e-6
         assert moved == bool(row.alters) or name in MOVES or name in TOO_SHORT, name
+    climbing = short[0], Act(lambda observation, images, memory: (FULL, memory))
+    fastest = {name: under(name, climbing).top_speed.mean() for name in (None, "hot motors", "worn motors")}
+    assert max(fastest["hot motors"], fastest["worn motors"]) < fastest[None] - 0.02
 
 
 MOVES = {name for name in LAWS if name.startswith(("commands", "play", "delay"))}
@@ -320,6 +325,7 @@ def test_what_walks_walks() -> None:
         changes = np.diff(heading, axis=0)
         assert abs(np.mean(changes[1:] * changes[:-1])) < 0.02 * np.mean(changes**2)
     later = law("delay walks").later
+    assert LATEST <= stress_rows.LATEST  # the queue of commands is as long as the rows need
     assert later.min() >= 0
     assert later.max() <= LATEST
     assert np.std(np.diff(later, axis=0)) == pytest.approx(0.02 * math.sqrt(PERIOD), rel=0.15)

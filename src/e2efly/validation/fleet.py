@@ -147,17 +147,8 @@ def _fly(mission: FleetMission, flights: Sequence[FleetFlight]) -> Iterator[Traj
                 if own:
                     plant.expose({name: sight.shutter(i) for i, name in own.items()})
                 images = sight.begin({i: partial(plant.shown, name) for i, name in own.items()}).images
-            yield fly(
-                runtime,
-                plant,
-                flight.start,
-                mission.duration,
-                latency,
-                reality.air,
-                mission.sample,
-                images,
-                reality.law,
-            )
+            air, law, sample = reality.air, reality.law, mission.sample
+            yield fly(runtime, plant, flight.start, mission.duration, latency, air, sample, images, law)
 
 
 def _prepare(task: str, sees: bool) -> None:
