@@ -176,7 +176,7 @@ def air_of(law: LawStep, motion: Any) -> tuple[Any, Any]:
 
 
 def _low_passed(lag: Any, before: Any, now: Any, dt: float) -> Any:
-    """A value of a first-order low-pass, (..., m), that has met `now` for `dt` s. A quaternion is scaled to length 1."""
+    """A value of a first-order low-pass, (..., m), that meets `now` for `dt` s. Quaternions have length 1."""
     xp = namespace(lag, now)
     kept = xp.exp(-dt / xp.maximum(lag, 1e-6))[..., None]
     if now.shape[-1] != 4:
