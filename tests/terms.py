@@ -14,6 +14,6 @@ VALUES: dict[str, Any] = {
     "battery_voltage": 15.6,
     "voltage_sag": 0.08,
     "speed_per_volt": 0.9,
-    "rotor_speed_ceiling": [2210.0, 2220.0, 2230.0, 1700.0],
+    "rotor_speed_ceiling": [3600.0, 3500.0, 3400.0, 3300.0],
 }
 """Of the size that a vehicle like the VIS-R has."""

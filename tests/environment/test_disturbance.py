@@ -45,13 +45,27 @@ def test_nothing_is_drawn_where_nothing_is_asked_for() -> None:
 
 
 def test_each_episode_draws_within_what_is_asked_for() -> None:
-    config = DisturbanceConfig(gust=2.0, rotor=0.1, sag=0.2, drift=0.05)
+    config = DisturbanceConfig(gust=2.0, rotor=0.1, sag=0.2, drift=0.05, ceiling=0.25)
     d = draw(config, random_key(0), 20_000)
     for drawn, low, high in (
-        (d.gust_speed, 0, 2.0), (d.rotor_share, 0.9, 1.1), (d.sag, 0, 0.2), (d.drift_rate, 0, 0.05)
+        (d.gust_speed, 0, 2.0), (d.rotor_share, 0.9, 1.1), (d.sag, 0, 0.2), (d.drift_rate, 0, 0.05),
+        (d.ceiling, 0.75, 1.0),
     ):  # fmt: skip
         assert low <= float(drawn.min()) < low + 0.02 * (high - low)
         assert high - 0.02 * (high - low) < float(drawn.max()) <= high + 1e-6
+
+
+def test_a_rotor_that_is_told_its_highest_thrust_reaches_its_ceiling() -> None:
+    """And no ceiling of its own leaves it as it was."""
+    config = EnvConfig(
+        command_mode="rotor_thrust", action_latency=(0.0, 0.0), disturbance=DisturbanceConfig(ceiling=0.3)
+    )
+    env = Env.of(STILL, RewardConfig({"prog2": 1.0}), config)
+    state = env.reset(random_key(0), 4)[0]
+    told = jax.lax.fori_loop(0, 15, lambda _, s: env.step(s, jnp.ones((4, 4)), restart=False)[0], state)
+    vehicle = load_vehicle("vis_r")
+    reached = np.vectorize(vehicle.rotor_thrust)(np.asarray(told.vehicle.rotor_speed, np.float64))
+    np.testing.assert_allclose(reached / vehicle.thrust_range[1], state.disturbance.ceiling, rtol=1e-3)
 
 
 def test_gusts_keep_their_strength_and_forget_within_their_time() -> None:

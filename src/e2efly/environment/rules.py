@@ -47,6 +47,9 @@ def check(
     if body.battery_voltage is not None:
         empty = (1 - config.randomize.get("battery_voltage", 0.0)) * body.battery_voltage
         body = dataclasses.replace(body, battery_voltage=empty)
+    if body.rotor_speed_ceiling is not None:
+        lowest = (1 - config.randomize.get("rotor_speed_ceiling", 0.0)) * body.rotor_speed_ceiling
+        body = dataclasses.replace(body, rotor_speed_ceiling=lowest)
     if body.battery_voltage is not None or body.rotor_speed_ceiling is not None:
         drawn *= reached_share(body)
     if drawn < 1:

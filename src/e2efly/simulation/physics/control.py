@@ -44,7 +44,7 @@ def remembered(
     begin: Parts,
     now: Parts,
     command: Command,
-    time: Array | float,
+    time: float,
 ) -> RateLoop:
     """What the rate loop remembers at a state that is reached `time` seconds after `begin`, where it was `memory`.
 

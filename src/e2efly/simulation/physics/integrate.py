@@ -42,7 +42,7 @@ def ahead(plant: Airframe, parts: Parts, wind: Vec3 | None, dt: float) -> tuple[
     differential equation, to second order. The middle is predicted by the derivative at the start, which the methods
     of higher order need anyway. A loop that runs every `HOLD` is half of that behind.
     """
-    time = (dt - jnp.minimum(HOLD, dt)) / 2
+    time = (dt - min(HOLD, dt)) / 2
     moved = _advance(parts, derivative(plant, parts, wind), time)
     return _finish(moved, parts.rotor_speed), time
 
