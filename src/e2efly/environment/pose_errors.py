@@ -18,6 +18,7 @@ jax.tree_util.register_dataclass(
     EstimateConfig, data_fields=[field.name for field in fields(EstimateConfig)], meta_fields=[]
 )
 
+Rows = Array | np.ndarray
 BETWEEN_JUMPS, JUMP = 4.0, 0.2
 """Mean time between two jumps of the poses, and mean length of one, s."""
 SIZES = np.array([3, 3, 4, 3])
@@ -49,7 +50,7 @@ class PoseErrors:
     """1 while the position jumps, otherwise 0."""
 
     @staticmethod
-    def of(lag: Array, turned: Array, jump: Array, hold: Array, seen: State) -> "PoseErrors":
+    def of(lag: Rows, turned: Rows, jump: Rows, hold: Rows, seen: State) -> "PoseErrors":
         """The estimator at the start of an episode, when it knows the state. The first four are its fields."""
         row, zero = _packed(seen), jnp.zeros_like(seen.position[:, 0])
         return PoseErrors(lag, turned, jump, hold, row, row, zero, zero)

@@ -12,8 +12,6 @@ from e2efly.config import (
     AlgorithmConfig,
     DisturbanceConfig,
     EnvConfig,
-    EstimateConfig,
-    LinkConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
@@ -43,13 +41,8 @@ OTHERS = EnvConfig(
         "mass": 0.25, "inertia": 0.5, "motor_time_constant": 0.8, "drag_linear": 0.9, "drag_quadratic": 0.9,
         "torque_ratio": 0.3, "rate_gain": 0.5,
     },
-    wind=5.0,
-    disturbance=DisturbanceConfig(gust=1.5, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
-    estimate=EstimateConfig(
-        position_lag=0.04, velocity_lag=0.08, attitude_lag=0.03, body_rate_lag=0.02,
-        yaw=0.09, tilt=0.035, jump=0.1, hold=4.0,
-    ),
-    link=LinkConfig(dropped=0.1, silence=0.2),
+    wind=3.0,
+    disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
 )  # fmt: skip
 """The vehicles of the preset `robust`."""
 AROUND = EnvConfig(
