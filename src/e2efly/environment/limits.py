@@ -1,12 +1,15 @@
 """Limits of the commands, and delays, that follow from a configuration and its vehicle."""
 
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from e2efly.config import EnvConfig
-from e2efly.config.domain import Domain
+from e2efly.config.domain import Domain, Extent
 from e2efly.control import COMMAND_MODES, command_limits
+from e2efly.policy.contract import SENSING
 from e2efly.vehicles.family import Family
 from e2efly.vehicles.posterior import ADDED, IDENTIFIED, TOGETHER, WIDEST, Posterior, load_posterior
 from e2efly.vehicles.vehicle import Vehicle
@@ -63,6 +66,30 @@ def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None
             each[... if entry.index is None else entry.index] = share
             shares[name] = each
     return drawn_domain(vehicle, config.command_mode, shares, float(config.disturbance.centre_of_mass))
+
+
+def sensing_of(
+    config: EnvConfig,
+    latency: Sequence[float],
+    rate: float,
+    *,
+    lags: Mapping[str, float] = MappingProxyType({}),
+    hold: float = 0.0,
+    dropped: float = 0.0,
+) -> Domain:
+    """The lags, ages and holes of the observed state that episodes draw, for the contract of a policy (`SENSING`).
+
+    Args:
+        config: the options that episodes draw from.
+        latency: smallest and largest latency from observation to command, s.
+        rate: control rate, Hz. Each control step has a new state.
+        lags: largest time constant of the low-pass of an observed field, s, by its name in `SENSING`. Others: 0.
+        hold: longest time for which a state is repeated, s.
+        dropped: largest share of the control steps without a new command.
+    """
+    age = latency[1] + config.observation_latency[1]
+    most = {"pose_age": age, "hold": 1 / rate + hold, "dropped": dropped} | dict(lags)
+    return tuple(Extent(name, unit, 0.0, round(most.get(name, 0.0), 6)) for name, unit in SENSING.items())
 
 
 def posterior_of(config: EnvConfig) -> Posterior | None:
