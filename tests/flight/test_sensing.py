@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from e2efly.commands.fly_check import look
+from e2efly.commands import fly_check
 from e2efly.config.domain import Domain, Extent
 from e2efly.flight.betaflight.controller import identify
 from e2efly.flight.pilot import estimate
@@ -207,12 +207,16 @@ def test_the_first_seconds_of_a_policy_s_flight_are_judged_and_no_later_ones(sin
 
 @pytest.mark.parametrize(("sensing", "code"), [(covering(), 1), (covering(hold=0.2), 0)])
 def test_the_check_shows_what_was_measured_and_refuses_what_was_not_covered(
-    sensing: Domain, code: int, capsys: pytest.CaptureFixture[str]
+    sensing: Domain, code: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = slow(sensing)
+
+    def sleep(seconds: float) -> None:
+        world.now += seconds
+
+    monkeypatch.setattr(fly_check, "time", SimpleNamespace(monotonic=lambda: world.now, sleep=sleep))
     contract: Any = SimpleNamespace(sensing=sensing, observation_latency_range_s=(0, 0), latency_range_s=(0, 0.06))
-    world.client.link.alive = True  # type: ignore[misc]
-    assert look(world.bridge, world, Console(width=500), (), None, contract) == code  # type: ignore[arg-type]
+    assert fly_check.look(world.bridge, world, Console(width=500), (), None, contract) == code  # type: ignore[arg-type]
     said = capsys.readouterr().out
     assert "hold" in said and "ms without a new pose, twice or more; the policy is for up to" in said
     assert (f"- {Reason.SENSING}: hold is" in said) is (code == 1)

@@ -38,8 +38,8 @@ class SensedQuantity:
         """The value, in words."""
         if self.seconds is None:
             return self.about
-        within = f" (within {2e3 * self.deviation:.0f} ms)" if self.deviation else ""
-        return f"{1e3 * self.seconds:.0f} ms{within}{self.about}"
+        within = f" (within {round(2e3 * self.deviation)} ms)" if self.deviation else ""
+        return f"{round(1e3 * self.seconds)} ms{within}{self.about}"
 
     def covered(self, trained: Domain | None) -> float | None:
         """The largest value that a training covered, or that every policy bears, s. None: it is not declared."""
