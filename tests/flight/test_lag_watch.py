@@ -119,6 +119,14 @@ def test_a_delay_is_measured_as_a_low_pass_is(name: str) -> None:
         assert off(velocity, 0.05) < 4e-3 and off(body_rate, 0.05) < 4e-3
 
 
+def test_noise_of_the_velocity_makes_a_lag_no_shorter() -> None:
+    """In a calm climb, noise that nobody subtracts would make it 12 ms shorter on average."""
+    noisy = Kind(0.02, 0.15, climb=0.4, noise=0.03)
+    found = [lags_of(watched(stream(noisy, seed, 0.08, seconds=2.5)))[0] for seed in range(12)]
+    assert abs(np.mean([lag.seconds for lag in found if lag is not None]) - 0.08) < 4e-3
+    assert sum(lag is not None for lag in found) > 8
+
+
 def test_poses_at_30_hz_tell_it_too() -> None:
     for seed in range(4):
         velocity, _ = lags_of(watched(stream(KINDS["a race"], seed, 0.05, rate=30.0)))
