@@ -18,8 +18,9 @@ rows, of a policy that sees, of the first 250 of them.
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
-`--domains` trains nothing: it writes into the contract of each file that says nothing of its courses or vehicles the
-ranges of the configuration beside it, by which it was trained; the graph with its weights stays, byte by byte.
+`--domains` trains nothing: it writes into the contract of each file that says nothing of its courses, vehicles or
+sensing the ranges of the configuration beside it, by which it was trained; the graph with its weights stays, byte by
+byte.
 `--digests` trains nothing: it gives the files that are there their digests, where they have none, and writes the digest
 of each file into zoo.json.
 """
@@ -41,7 +42,7 @@ import onnx
 from common import arguments, table
 
 from e2efly.config.storage import write_json
-from e2efly.environment.limits import posterior_of, vehicles_of
+from e2efly.environment.limits import posterior_of, sensing_of, vehicles_of
 from e2efly.environment.stress_rows import ALL, rows_for
 from e2efly.flight.sight.samples import COUNT, packed, samples_file
 from e2efly.learning.judge import worst_success
@@ -198,10 +199,11 @@ def starts_of(policy: Path) -> dict[str, np.ndarray]:
 
 
 def declare(file: Path) -> None:
-    """Let the contract of a file say for which courses and vehicles it was trained, if it does not."""
+    """Let the contract of a file say for which courses, vehicles and sensing it was trained, if it does not."""
     config = from_json(json.loads(config_file(file).read_text()), str(config_file(file)))
     contract, graph = load_policy(file).contract, onnx.load(file).graph
-    about = {"courses": contract.courses or config.task.domain(), "vehicles": contract.vehicles}
+    sensing = contract.sensing or sensing_of(config.env, contract.latency_range_s, contract.control_rate_hz)
+    about = {"courses": contract.courses or config.task.domain(), "vehicles": contract.vehicles, "sensing": sensing}
     if not contract.of_family and contract.vehicles is None:
         vehicle = load_vehicle(config.env.vehicle)
         assert vehicle.hash == contract.vehicle_hash, file

@@ -6,12 +6,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.fly_check import add_images, add_lags, print_settings, print_table
+from e2efly.commands.fly_check import add_images, add_sensing, print_settings, print_table
+from e2efly.config.domain import Extent
 from e2efly.flight.betaflight import messages, settings_by_name
 from e2efly.flight.betaflight.allowed_modes import ANGLE
 from e2efly.flight.betaflight.client import MESSAGES, Client
@@ -23,11 +23,15 @@ from e2efly.flight.betaflight.row import Row, problems
 from e2efly.flight.betaflight.settings_check import NOT_TOLD, examine
 from e2efly.flight.betaflight.settings_messages import RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, sticks_of
+from e2efly.flight.pilot.delay_watch import MeasuredDelay
+from e2efly.flight.pilot.estimate import StateEstimate
+from e2efly.flight.pilot.lag_watch import MeasuredLag
 from e2efly.flight.pose.conditions import Checks
+from e2efly.flight.pose.pace import Half, Pace
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.sight.quality import SeenImages
+from e2efly.policy.contract import Contract
 from e2efly.policy.loader import load_policy
-from e2efly.policy.odometry import Sample
 from e2efly.policy.zoo import policy_file
 from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_msp_client import Wire
@@ -231,20 +235,45 @@ def test_the_table_says_which_settings_the_pilot_has_to_look_at(capsys: pytest.C
     assert out[-5:] == [*lines, "save"]
 
 
-@pytest.mark.parametrize("given", [None, np.zeros(3)])
-def test_the_report_says_how_late_the_velocities_are(
-    given: np.ndarray | None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    table, sample = Table(box=None), Sample(0.0, np.zeros(3), np.array([1.0, 0, 0, 0]), velocity=given)
-    bridge: Any = SimpleNamespace(estimate=SimpleNamespace(checks=Checks(velocity_cutoff=10.0)))
-    contract = load_policy(policy_file(Path("hover"))).contract
-    trained = replace(contract, observation_latency_range_s=(0.0, 0.02), latency_range_s=(0.05, 0.05))
-    add_lags(table, bridge, [sample], trained)
+def reported(estimate: StateEstimate, contract: Contract | None, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+    """The rows on the sensing, by the first words; the rows without such words together under none."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    add_sensing(table, estimate, contract)
     print_table(Console(width=30), table)
-    said = capsys.readouterr().out
-    assert ("estimated from the poses, 32 ms later" in said) == (given is None)
-    assert "body rate" in said and "estimated from the poses, 11 ms later" in said
-    assert "states 0 to 20 ms old, and 50 ms from observation to command" in said
+    lines = [line.split("  ", 1) for line in capsys.readouterr().out.splitlines()]
+    return {name.strip(): said.strip() for name, said in lines}
+
+
+def test_the_report_says_how_late_velocities_and_poses_are_beside_the_training(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    contract = load_policy(policy_file(Path("hover"))).contract
+    most = {"velocity_lag": 0.0, "body_rate_lag": 0.08, "pose_age": 0.07, "hold": 1 / 30}
+    trained = replace(
+        contract, observation_latency_range_s=(0.0, 0.02), latency_range_s=(0.05, 0.05),
+        sensing=tuple(Extent(name, "s", 0.0, high) for name, high in most.items()),
+    )  # fmt: skip
+    alone = reported(StateEstimate(Checks(velocity_cutoff=15.0), 0.1), trained, capsys)
+    estimated = "later than the poses, from which it is estimated; the policy is for up to"
+    assert alone["velocity lag"] == f"21 ms {estimated} 25 ms" and alone["body rate lag"] == f"11 ms {estimated} 80 ms"
+    assert alone["pose age"] == "not measured: not enough motion; the policy is for up to 70 ms"
+    assert "states 0 to 20 ms old, and 50 ms from observation to command" in alone[""]
+    watched = StateEstimate(
+        Checks(), 0.1, given=(True, True), lag=(MeasuredLag(0.06, 0.002), None),
+        delay=MeasuredDelay(0.1, 0.012, 0.9), pace=Pace(9.0, 9.0, 9.0, present=Half(0.0, 900, 0.1, (0.08, 0.06))),
+    )  # fmt: skip
+    rows = reported(watched, trained, capsys)
+    assert rows["velocity lag"] == "no: 60 ms (within 4 ms) later than the poses; the policy is for up to 25 ms"
+    assert rows["body rate lag"] == "not measured: not enough motion; the policy is for up to 80 ms"
+    assert rows["pose age"] == "no: 100 ms (within 24 ms) by the gyro; the policy is for up to 70 ms"
+    assert rows["hold"] == "no: 60 ms without a new pose, twice or more; the policy is for up to 50 ms"
+    old = reported(watched, replace(trained, sensing=None), capsys)
+    assert old["velocity lag"] == "60 ms (within 4 ms) later than the poses"
+    table = Table(box=None)
+    add_sensing(table, watched, replace(trained, sensing=None))
+    print_table(Console(width=30), table)
+    assert "the policy's file does not state" in capsys.readouterr().out
+    assert "" not in reported(watched, None, capsys)
 
 
 def test_the_report_says_how_the_camera_of_the_training_was_mounted(capsys: pytest.CaptureFixture[str]) -> None:

@@ -180,6 +180,7 @@ CASES: dict[Reason, list[Callable[[], Flight]]] = {
         lambda: flown(policy_flying(), having(AWAY, accelerometer_problem="z")),
     ],
     Reason.MOTION: [refused(motion_problem="they move otherwise")],
+    Reason.SENSING: [refused(sensing_problem="hold is 90 ms"), kept_out(sensing_problem="velocity_lag is 60 ms")],
     Reason.OUTSIDE_FENCE: [
         refused(odometry=at(x=5.0)),
         refused(odometry=at(y=-5.0)),

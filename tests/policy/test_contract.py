@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from e2efly.config.domain import Extent
 from e2efly.policy.contract import ACTION_MAPPING, Contract
 
 Path = tuple[str | int, ...]
@@ -114,6 +115,38 @@ def test_round_trip_keeps_everything() -> None:
     assert json.loads(contract.to_json()) == EXAMPLE
     assert Contract.from_json(contract.to_json()) == contract
     assert (contract.task, contract.action.high[0], contract.observation[0].scale) == ("hover", 27.3, 4.0)
+
+
+SENSED = [
+    {"name": "velocity_lag", "unit": "s", "low": 0.0, "high": 0.08},
+    {"name": "dropped", "unit": "1", "low": 0.0, "high": 0.1},
+]
+"""The sensing that a training covered."""
+
+
+def test_the_sensing_of_the_training_is_kept_and_a_file_of_before_has_none() -> None:
+    contract = Contract.from_json(json.dumps(EXAMPLE | {"sensing": SENSED}))
+    assert contract.sensing == (Extent("velocity_lag", "s", 0.0, 0.08), Extent("dropped", "1", 0.0, 0.1))
+    assert Contract.from_json(contract.to_json()) == contract
+    assert Contract.from_json(json.dumps(EXAMPLE)).sensing is None
+    assert "sensing" not in json.loads(Contract.from_json(json.dumps(EXAMPLE)).to_json())
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("name", "velocity_leg", "sensing[0].name is 'velocity_leg'; accepted: 'position_lag' or 'velocity_lag'"),
+        ("unit", "ms", "sensing[0].unit is 'ms'; accepted: 's', as its name is 'velocity_lag'"),
+        ("low", -0.1, "sensing[0].low is -0.1; accepted: 0 or more"),
+        ("low", 0.1, "sensing[0].low is 0.1; accepted: at most sensing[0].high, 0.08"),
+        ("high", math.nan, "sensing[0].high is nan; accepted: a finite number"),
+        ("hihg", 0.1, "unknown key 'sensing[0].hihg'; did you mean 'high'"),
+    ],
+)
+def test_a_sensing_that_makes_no_sense_is_refused_by_name(key: str, value: Any, said: str) -> None:
+    text = json.dumps(EXAMPLE | {"sensing": [SENSED[0] | {key: value}, SENSED[1]]})
+    with pytest.raises(ValueError, match=re.escape(said)):
+        Contract.from_json(text)
 
 
 def test_layout() -> None:

@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
@@ -14,9 +15,11 @@ from e2efly.flight.betaflight.messages import StatusEx
 from e2efly.flight.betaflight.row import Row, command_lines, problems
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander
+from e2efly.flight.pilot.estimate import StateEstimate
 from e2efly.flight.pilot.flight_state import Mission
 from e2efly.flight.pilot.hover import roll_pitch
 from e2efly.flight.pilot.refusals import take_off_refusals
+from e2efly.flight.pilot.sensing import sensed
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.process import printable
 from e2efly.flight.sight.image_source import ImageSource
@@ -28,8 +31,11 @@ from e2efly.policy.odometry import Sample
 
 WIDEST = 10_000
 """The longest line of a table into a file or a pipe."""
-LOOK_S = 1.5
-"""How long `--check` watches poses and receiver, s."""
+LOOK_S, MOVED_S = 1.5, 6.0
+"""How long `--check` watches poses and receiver, s, and how long at most while the vehicle is moved by hand and lags or
+age are not measured yet."""
+CARRIED = 0.1, 0.2
+"""The vehicle counts as moved above this speed, m/s, or body rate, rad/s."""
 STATUS_S, STATUSES = 1.0, 3
 """Time, s, and number of messages in which the controller may report whether it is armed, before a bridge begins."""
 POSITIONS = {Mission.LAND: "low", Mission.HOVER: "middle", Mission.POLICY: "high"}
@@ -76,13 +82,13 @@ def look(
         contract: the contract of the policy.
 
     Returns:
-        1 when a setting or missing poses forbid a take-off, else 0.
+        1 when a setting, missing poses or a sensing that the policy was not trained for forbid a take-off, else 0.
     """
     bridge.look(time.monotonic())  # the first step takes long, and what comes meanwhile may be too much for one reading
     source.read(time.monotonic())
-    end, poses, refused = time.monotonic() + LOOK_S, list[Sample](), source.refused
+    start, poses, refused = time.monotonic(), list[Sample](), source.refused
     times: list[set[float]] = [set() for _ in bridge.cameras]
-    while (now := time.monotonic()) < end:
+    while (now := time.monotonic()) < start + LOOK_S or (now < start + MOVED_S and _tells_more(bridge)):
         poses += bridge.look(now)
         for taken, seen in zip(times, bridge.seen, strict=True):
             taken |= {seen.frame.time} if seen.frame is not None else set()
@@ -90,8 +96,8 @@ def look(
     table = Table(box=None, show_header=False, pad_edge=False)
     _add_poses(table, bridge, source, poses, source.refused - refused)
     if bridge.odometry is not None:
-        add_lags(table, bridge, poses, contract)
-    add_images(table, bridge, [len(taken) / LOOK_S for taken in times], policy)
+        add_sensing(table, bridge.estimate, contract)
+    add_images(table, bridge, [len(taken) / (now - start) for taken in times], policy)
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot
@@ -109,7 +115,15 @@ def look(
     console.print("What stands against a take-off now:" if refusals else "Nothing stands against a take-off.")
     for refusal in refusals:
         console.print(f"  - {printable(refusal)}")
-    return 1 if problems(rows) or bridge.odometry is None else 0
+    return 1 if problems(rows) or bridge.odometry is None or bridge.inputs.sensing_problem else 0
+
+
+def _tells_more(bridge: Bridge) -> bool:
+    """Whether the vehicle is moved, and something of the sensing is not measured yet."""
+    o = bridge.odometry
+    if o is None or all(part.seconds is not None for part in sensed(bridge.estimate)):
+        return False
+    return any(float(np.linalg.norm(x)) > most for x, most in zip((o.velocity, o.body_rate), CARRIED, strict=True))
 
 
 def refuse_in_flight(bridge: Bridge) -> None:
@@ -151,16 +165,16 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
         table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
 
 
-def add_lags(table: Table, bridge: Bridge, poses: list[Sample], contract: Contract | None) -> None:
-    """How late the velocities are, beyond the poses."""
-    checks, newest = bridge.estimate.checks, poses[-1] if poses else None
-    for name, given, lag in (
-        ("velocity", newest is not None and newest.velocity is not None, checks.velocity_lag),
-        ("body rate", newest is not None and newest.body_rate is not None, checks.rate_lag),
-    ):
-        said = f"estimated from the poses, {1e3 * lag:.0f} ms later than they are"
-        table.add_row(name, "the source's own: how late it is, only the source knows" if given else said)
+def add_sensing(table: Table, estimate: StateEstimate, contract: Contract | None) -> None:
+    """Lags, age and holes of the poses as measured, beside what the training of a policy covered."""
+    for part in sensed(estimate):
+        covered = None if contract is None else part.covered(contract.sensing)
+        mark = "no: " if contract is not None and part.problem(contract.sensing) else ""
+        trained = "" if covered is None else f"; the policy is for up to {1e3 * covered:.0f} ms"
+        table.add_row(part.name.replace("_", " "), f"{mark}{part.said}{trained}")
     if contract is not None:
+        if contract.sensing is None:
+            table.add_row("", "which lags, ages and holes its training covered, the policy's file does not state")
         states, delay = map(_milliseconds, (contract.observation_latency_range_s, contract.latency_range_s))
         table.add_row("", f"the policy was trained with states {states} old, and {delay} from observation to command")
 

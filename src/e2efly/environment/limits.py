@@ -1,12 +1,15 @@
 """Limits of the commands, and delays, that follow from a configuration and its vehicle."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from e2efly.config import EnvConfig
-from e2efly.config.domain import Domain
+from e2efly.config.domain import Domain, Extent
 from e2efly.control import COMMAND_MODES, command_limits
+from e2efly.policy.contract import SENSING
 from e2efly.vehicles.family import Family
 from e2efly.vehicles.posterior import ADDED, IDENTIFIED, TOGETHER, WIDEST, Posterior, load_posterior
 from e2efly.vehicles.vehicle import Vehicle
@@ -63,6 +66,22 @@ def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None
             each[... if entry.index is None else entry.index] = share
             shares[name] = each
     return drawn_domain(vehicle, config.command_mode, shares, float(config.disturbance.centre_of_mass))
+
+
+def sensing_of(config: EnvConfig, latency: Sequence[float], rate: float) -> Domain:
+    """The lags, ages and holes of the observed state that episodes draw, for the contract of a policy (`SENSING`).
+
+    Args:
+        config: the options that episodes draw from.
+        latency: smallest and largest latency from observation to command, s.
+        rate: control rate, Hz. Each control step has a new state, unless it is repeated.
+    """
+    most = {name: getattr(config.estimate, name, 0.0) for name in SENSING} | {
+        "pose_age": latency[1] + config.observation_latency[1],
+        "hold": (1 + math.floor(config.estimate.hold)) / rate,
+        "dropped": config.link.dropped,
+    }
+    return tuple(Extent(name, unit, 0.0, round(most[name], 6)) for name, unit in SENSING.items())
 
 
 def posterior_of(config: EnvConfig) -> Posterior | None:

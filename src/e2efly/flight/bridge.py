@@ -36,6 +36,7 @@ from e2efly.flight.pilot.hover import LIFTED, controlled, flight_gains, rates_of
 from e2efly.flight.pilot.hovering import DEFAULT, HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
 from e2efly.flight.pilot.inertial import FRESH_S, Measurement
 from e2efly.flight.pilot.landing import has_stood
+from e2efly.flight.pilot.sensing import WATCHED_S, sensing_problem
 from e2efly.flight.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
 from e2efly.flight.pilot.touch import LAGS
 from e2efly.flight.pose.conditions import Checks
@@ -54,8 +55,8 @@ from e2efly.vehicles.vehicle import Vehicle
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
 """Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
 poses."""
-DELAY_STEPS = 50
-"""On the ground, the delay of the poses is measured every so many control steps."""
+MEASURE_STEPS = 50
+"""Lags and age of the poses are measured and judged every so many control steps."""
 SILENT_S = 0.1
 """If the controller has said nothing for this time, it may hold the next command for as long as its silence lasts,
 s."""
@@ -144,6 +145,7 @@ class Bridge:
         self._overdue: tuple[float, ...] = ()
         self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
         self._held, self._looked = self.sent, 0.0
+        self._unlike: str | None = None
 
     def adopt(self, info: ControllerInfo, settings_problems: tuple[str, ...]) -> None:
         """Take over the controller's settings as they were read, and the reasons why they forbid a take-off."""
@@ -226,7 +228,12 @@ class Bridge:
         """The inputs of the state machine."""
         flight, mode = self.flight, self.flight.mode
         probed = self.probe.look(now, reading, self.sticks, grounded=mode is Mode.INIT) if sends else ()
-        self.estimate = told = estimate.compare(self.estimate, mode, measure_delay=self._ticks % DELAY_STEPS == 0)
+        begins = mode is not Mode.POLICY or now - flight.since < WATCHED_S
+        measure = begins and self._ticks % MEASURE_STEPS == 0
+        self.estimate = told = estimate.compare(self.estimate, mode, measure=measure)
+        if measure or not begins:
+            trained = None if self.worker is None or self.settings.untrained_sensing else self.worker.sensing
+            self._unlike = sensing_problem(told, trained) if begins else None
         slow = pace_problem(told.pace, self.settings.odometry_timeout)
         return Inputs(
             odometry=told.odometry,
@@ -253,6 +260,7 @@ class Bridge:
             accelerometer_problem=told.accelerometer_problem(mode),
             force=told.inertial.force,
             motion_problem=told.motion_problem(mode),
+            sensing_problem=self._unlike,
             buried=flight.blind and told.inertial.buried(flight.home, now),
             stands=told.inertial.touch.stands(now),
             deaf=not told.inertial.touch.tells(now) and now - self._heard_since > DEAF_S,

@@ -93,6 +93,8 @@ class FlightSettings:
     the odometry is judged to be wrong: a wrong heading, or the rigid body of another vehicle."""
     heading_agreement: float = number(0.7, above=0, high=ANGLE)
     """Largest error of the odometry's heading, as estimated from the flight itself, rad."""
+    untrained_sensing: bool = False
+    """Fly a policy although lags, age or holes of the poses are larger than what its training covered."""
     fence: Fence = Fence()
     """The volume in which policies may fly."""
     channels: PilotChannels = PilotChannels()

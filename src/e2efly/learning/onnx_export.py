@@ -13,7 +13,7 @@ from e2efly.config import TrainConfig
 from e2efly.config.storage import write_atomically
 from e2efly.control import COMMAND_MODES
 from e2efly.environment import Env
-from e2efly.environment.limits import limits_of, posterior_of, vehicles_of
+from e2efly.environment.limits import limits_of, posterior_of, sensing_of, vehicles_of
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.learning.onnx_layers import policy_graph
 from e2efly.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
@@ -75,6 +75,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         action=Action(mode.name, mode.fields, mode.units, *limits),
         hover_action=_decimals(env.hover),
         courses=config.task.domain(),
+        sensing=sensing_of(about, latency, float(rate)),
     )
 
 

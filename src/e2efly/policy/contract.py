@@ -39,10 +39,17 @@ ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
 """Mapping from an action to a physical command, entry by entry."""
 RATES = (0.1, 10_000.0)
 """Smallest and largest control rate, Hz."""
-OPTIONAL = ("vehicles", "courses")
+OPTIONAL = ("vehicles", "courses", "sensing")
 """Fields that a contract may leave out: ranges that its training did not declare."""
 FRAMES = ("world", "body", "world_body", "none")
 """Frames of an observation field."""
+SENSING = {
+    "position_lag": "s", "velocity_lag": "s", "attitude_lag": "s", "body_rate_lag": "s", "pose_age": "s", "hold": "s",
+    "dropped": "1",
+}  # fmt: skip
+"""Quantities of `Contract.sensing` with their units. NAME_lag: time constant of a first-order low-pass of a field of
+the state, beyond the age of the pose. pose_age: time from the motion to the command that follows from it. hold: time
+between two new states. dropped: share of the control steps without a new command."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,9 @@ class Contract:
     (`e2efly.vehicles.vehicle_domain`). None, and no JSON key: not declared, or a family's."""
     courses: Domain | None = None
     """Ranges of the courses and worlds that it was trained for. None, and no JSON key: not declared."""
+    sensing: Domain | None = None
+    """Ranges of the lags, ages and holes of the observed state in training: the quantities of `SENSING`. None, and no
+    JSON key: not declared, as in files of before."""
 
     def outside(self, courses: Domain) -> tuple[str, ...]:
         """The quantities in which courses lie outside of what it was trained for, in words. Empty: in none, or its
@@ -292,8 +302,20 @@ def _contract(x: dict[str, Any]) -> Contract:
         action=_action(x["action"]),
         hover_action=hover,
         vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
-        **{name: None if x[name] is None else _domain(x[name], name) for name in OPTIONAL},
+        **{name: None if x[name] is None else _domain(x[name], name) for name in OPTIONAL if name != "sensing"},
+        sensing=None if x["sensing"] is None else _sensing(x["sensing"]),
     )
+
+
+def _sensing(value: Any) -> Domain:
+    found = _domain(value, "sensing")
+    for i, part in enumerate(found):
+        read.one_of(part.name, f"sensing[{i}].name", SENSING)
+        if part.unit != SENSING[part.name]:
+            raise read.refusal(f"sensing[{i}].unit", part.unit, f"{SENSING[part.name]!r}, as its name is {part.name!r}")
+        if part.low < 0:
+            raise read.refusal(f"sensing[{i}].low", part.low, "0 or more")
+    return found
 
 
 def _domain(value: Any, field: str) -> Domain:

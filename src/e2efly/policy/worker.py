@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from e2efly.config.domain import Domain
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
@@ -40,6 +41,11 @@ class Worker(Protocol):
     @property
     def images(self) -> tuple[Image, ...]:
         """The images that it sees."""
+        ...
+
+    @property
+    def sensing(self) -> Domain | None:
+        """The sensing that its training covered. None: not declared, or it was not trained."""
         ...
 
     @property
@@ -111,6 +117,11 @@ class PolicyWorker:
     def images(self) -> tuple[Image, ...]:
         """The images that the contract names."""
         return self.runtime.policy.contract.images
+
+    @property
+    def sensing(self) -> Domain | None:
+        """The sensing that its contract declares. None: it declares none."""
+        return self.runtime.policy.contract.sensing
 
     @property
     def lands(self) -> bool:

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from e2efly.config.domain import Domain
 from e2efly.flight.commander.command import Command, Limits
 from e2efly.flight.commander.stream import CommandStream, refuse, silence, take, unsteady
 from e2efly.flight.pilot.hover import controlled, flight_gains, rates_of
@@ -74,6 +75,8 @@ class Commander:
     name = NAME
     images: tuple[Image, ...] = ()
     """It uses no images."""
+    sensing: Domain | None = None
+    """It was not trained."""
     lands = done = False
     """It never ends its flight or lands by itself. The pilot ends the flight and lands."""
     native_id: int | None = None

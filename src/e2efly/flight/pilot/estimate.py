@@ -11,6 +11,7 @@ from e2efly.flight.pilot.flight_state import GROUNDED, Flight, Mode
 from e2efly.flight.pilot.heading_watch import HeadingWatch, watched
 from e2efly.flight.pilot.hover import LIFTED, roll_pitch
 from e2efly.flight.pilot.inertial import Inertial, Measurement
+from e2efly.flight.pilot.lag_watch import LagWatch, MeasuredLag, lags_of, moved
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pace import Pace, paced
 from e2efly.flight.pose.tracking import PoseTrack, age, track
@@ -25,6 +26,8 @@ CONTINUES = 0.3
 m/s."""
 LATE_S = 0.05
 """How much later than the latency assumed by the gains poses may be, s."""
+MEASURED = (Mode.INIT, Mode.TAKEOFF, Mode.HOVER, Mode.POLICY)
+"""Modes in which the delay of the poses and the lags of the velocities are measured."""
 FROZEN = "its numbers do not change"
 """Reported for an accelerometer that does not even measure the vibration of the rotors."""
 
@@ -54,9 +57,15 @@ class StateEstimate:
     inertial: Inertial = Inertial()
     """Accelerometer, gyroscope, and the velocity without poses."""
     delays: DelayWatch = DelayWatch()
-    """Rotations from poses and gyroscope on the ground, with which the delay of the poses is measured."""
+    """Rotations from poses and gyroscope, with which the delay of the poses is measured."""
     delay: MeasuredDelay | None = None
     """The delay of the poses. None: not measured."""
+    given: tuple[bool, bool] = (False, False)
+    """Whether velocity and body rate are the source's own."""
+    lags: LagWatch = LagWatch()
+    """Comparison of the source's velocity and body rate with its poses."""
+    lag: tuple[MeasuredLag | None, MeasuredLag | None] = (None, None)
+    """How late the source's velocity and body rate are. None: not measured."""
     opposed: str | None = None
     """How poses and sensors contradicted each other when the vehicle was carried. Kept until they agree."""
 
@@ -125,7 +134,7 @@ def see(
         tracked, odometry, refused = track(after.checks, after.track, sample)
         after = replace(after, track=tracked, refused=refused)
         if odometry is not None:
-            after = _accept(after, odometry, sample.received, flight, attitude, now)
+            after = _accept(after, odometry, sample, flight, attitude, now)
     frozen = (after.refused or "").startswith("frozen")  # this has lasted for some time already
     if not after.track.fault and now - after.good_at < OUTLIERS_S and not frozen:
         after = replace(after, refused=None)
@@ -137,22 +146,25 @@ def see(
 
 
 def _accept(
-    before: StateEstimate, odometry: Odometry, received: float, flight: Flight, attitude: Attitude | None, now: float
+    before: StateEstimate, odometry: Odometry, sample: Sample, flight: Flight, attitude: Attitude | None, now: float
 ) -> StateEstimate:
     """The estimate after a pose that passed the checks."""
-    heading = before.heading
+    heading, new = before.heading, before.track.same_since == odometry.time
+    given = sample.velocity is not None, sample.body_rate is not None
     if attitude is not None:
         lifted = height_of(odometry, flight) > LIFTED
         heading = watched(heading, odometry, attitude) if lifted else HeadingWatch()
     told = inertial.see(
         before.inertial, odometry, now,
-        moved=before.track.same_since == odometry.time,  # otherwise it may be frozen while the motion goes on
+        moved=new,  # otherwise it may be frozen while the motion goes on
         trusted=(not flight.misled or flight.turned is not None) and _continues(before, odometry, flight),
         turned=flight.turned or 0.0, latest=before.latest,
     )  # fmt: skip
     return replace(
-        before, odometry=odometry, good_at=now, pace=paced(before.pace, odometry.time, received), heading=heading,
-        inertial=told, delays=turned(before.delays, odometry) if flight.mode is Mode.INIT else before.delays,
+        before, odometry=odometry, good_at=now, heading=heading, inertial=told, given=given,
+        pace=paced(before.pace, odometry.time, sample.received, new=new or flight.mode in GROUNDED),
+        delays=turned(before.delays, odometry) if flight.mode in MEASURED else before.delays,
+        lags=moved(before.lags, odometry, before.track.angle) if any(given) else before.lags,
     )  # fmt: skip
 
 
@@ -166,27 +178,28 @@ def _continues(before: StateEstimate, odometry: Odometry, flight: Flight) -> boo
     return abs(float(odometry.velocity[2]) - reckoned.climb) <= CONTINUES + reckoned.doubt
 
 
-def compare(before: StateEstimate, mode: Mode, *, measure_delay: bool) -> StateEstimate:
+def compare(before: StateEstimate, mode: Mode, *, measure: bool) -> StateEstimate:
     """On the ground: a contradiction that was found while the vehicle was carried stays until it is carried again and
-    agrees. In the air nothing changes. With `measure_delay`, the delay of the poses is measured, which takes a fraction
+    agrees. With `measure`, the delay of the poses and the lags of the velocities are measured, which takes a fraction
     of a millisecond.
     """
+    if measure and mode in MEASURED:
+        velocity, body_rate = (new or old for new, old in zip(lags_of(before.lags), before.lag, strict=True))
+        before = replace(before, delay=delay_of(before.delays) or before.delay, lag=(velocity, body_rate))
     if mode not in GROUNDED:
         return before
-    watch, opposed, delay = before.inertial.watch, before.opposed, before.delay
+    watch, opposed = before.inertial.watch, before.opposed
     if watch.opposed is not None:
         opposed = f"{watch.opposed}, when it was carried; carry it again, once frames and axes are right"
     elif watch.agrees:
         opposed = None
-    if mode is Mode.INIT and measure_delay:
-        delay = delay_of(before.delays) or delay
-    return replace(before, opposed=opposed, delay=delay)
+    return replace(before, opposed=opposed)
 
 
 def feel(before: StateEstimate, m: Measurement, turned_at: float, mode: Mode, now: float) -> StateEstimate:
     """The estimate after a reply of the inertial sensors. Its body rate was true at `turned_at`, s. `now` is in s."""
     x, y, z = m.gyro.tolist()
-    delays = felt(before.delays, turned_at, (x, y, z)) if mode is Mode.INIT else before.delays
+    delays = felt(before.delays, turned_at, (x, y, z)) if mode in MEASURED else before.delays
     return replace(before, delays=delays, inertial=inertial.measure(before.inertial, m, now))
 
 

@@ -64,6 +64,7 @@ class Reason(StrEnum):
     ATTITUDE = "the controller's attitude is unlike the odometry's"
     ACCELEROMETER = "the accelerometer is wrong"
     MOTION = "poses and sensors contradict each other"
+    SENSING = "the sensing is not what the policy was trained with"
     OUTSIDE_FENCE = "outside the fence"
     WAITING = "ready: waiting for the mission switch"
     MISSION = "mission switch"
@@ -135,6 +136,8 @@ class Inputs:
     """(3,) newest specific force, body FLU, m/s^2. None: not known."""
     motion_problem: str | None = None
     """How the poses contradict the controller's sensors. None: they agree."""
+    sensing_problem: str | None = None
+    """How lags, age or holes of the poses differ from what the policy was trained with. None: they do not."""
     buried: bool = False
     """Without odometry: the estimated height is far under the ground."""
     stands: bool | None = None

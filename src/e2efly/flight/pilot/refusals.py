@@ -31,6 +31,7 @@ def take_off_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs) 
         reasons.append(f"{Reason.ACCELEROMETER}: {inputs.accelerometer_problem}")
     if inputs.motion_problem:
         reasons.append(f"{Reason.MOTION}: {inputs.motion_problem}")
+    reasons += _sensing(inputs)
     reasons += battery_refusals(settings, inputs)
     reasons += _sticks(settings, inputs.pilot, Reason.STICKS)
     if inputs.pilot is None:
@@ -70,6 +71,10 @@ def battery_refusals(settings: FlightSettings, inputs: Inputs) -> list[str]:
     return []
 
 
+def _sensing(inputs: Inputs) -> list[str]:
+    return [f"{Reason.SENSING}: {inputs.sensing_problem}"] if inputs.sensing_problem else []
+
+
 def _sticks(settings: FlightSettings, pilot: Pilot | None, reason: Reason) -> list[str]:
     if pilot is None or pilot.deflection <= settings.stick_deadband:
         return []
@@ -81,6 +86,7 @@ def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, od
     reasons: list[str] = [Reason.LOCKED] if flight.lock else []
     if inputs.policy_problem:
         reasons.append(f"{Reason.POLICY}: {inputs.policy_problem}")
+    reasons += _sensing(inputs)
     reasons += _sticks(settings, inputs.pilot, Reason.STICK_INPUT)
     age = max(flight.now - odometry.time, 0.0)
     if problem := fence_problem(

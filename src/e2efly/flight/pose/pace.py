@@ -24,6 +24,8 @@ class Half:
     """Good poses in it."""
     oldest: float = 0.0
     """The largest age that the newest pose reached in it, s."""
+    holes: tuple[float, float] = (0.0, 0.0)
+    """The longest and the second longest time between two new poses in it, s."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Pace:
     """When the newest good pose was true, s. None before the first pose."""
     received: float = 0.0
     """When it arrived, s."""
+    new: float | None = None
+    """When the newest pose that repeats none was true, s."""
     before: Half = Half()
     """The half window before the present one."""
     present: Half = Half()
@@ -49,18 +53,31 @@ class Pace:
         """The largest age that the newest pose reached within the window, s."""
         return max(self.before.oldest, self.present.oldest)
 
+    @property
+    def hole(self) -> float | None:
+        """The longest time without a new pose that was reached twice within the window, s. None: watched too shortly.
 
-def paced(pace: Pace, time: float, received: float) -> Pace:
+        A single one, such as a lost message, is no property of a source.
+        """
+        if self.received - min(self.before.began, self.present.began) < WINDOW_S / 4:
+            return None
+        return sorted((*self.before.holes, *self.present.holes))[-2]
+
+
+def paced(pace: Pace, time: float, received: float, *, new: bool = True) -> Pace:
     """The pace after one more good pose. `time` is when the pose was true, and `received` when it arrived, s on the
-    local monotonic clock.
+    local monotonic clock. A pose that repeats the one before bit for bit is not `new`.
     """
-    if pace.time is None:  # the first pose starts the observation and does not count for the rate
-        return Pace(time, received, present=Half(began=received))
+    if pace.time is None or pace.new is None:  # the first starts the observation and does not count for the rate
+        return Pace(time, received, time, present=Half(began=received))
     before, present = pace.before, pace.present
     if received - present.began > WINDOW_S / 2:
         before, present = present, Half(began=pace.received)
-    present = replace(present, count=present.count + 1, oldest=max(present.oldest, received - pace.time))
-    return Pace(time, received, before, present)
+    first, second = present.holes
+    hole = time - pace.new if new else 0.0
+    holes = (max(first, hole), max(second, min(first, hole)))
+    present = replace(present, count=present.count + 1, oldest=max(present.oldest, received - pace.time), holes=holes)
+    return Pace(time, received, time if new else pace.new, before, present)
 
 
 def pace_problem(pace: Pace, timeout: float) -> str | None:

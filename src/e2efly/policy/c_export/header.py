@@ -152,6 +152,7 @@ def _about(c: Contract, big: str, digest: str, needs: Sizes) -> str:
     for kind, domain, about in (
         ("VEHICLE", c.domain, ""),
         ("COURSE", c.courses or (), "The courses and worlds that it was trained for, in SI units:"),
+        ("SENSING", c.sensing or (), "The lags, ages and holes of what it saw in training, in SI units:"),
     ):
         lines += [comment(about)] if domain and about else []
         for part in domain:
