@@ -58,7 +58,7 @@ class PoseErrors:
     def shown(self, seen: State) -> State:
         """The state that the policy is told: `seen` with the estimator's errors."""
         position, velocity, quaternion, body_rate = jnp.split(self.told, np.cumsum(SIZES)[:-1], axis=-1)
-        heading, roll, pitch = (self.turned[:, i] for i in range(3))
+        heading, roll, pitch = jnp.moveaxis(jnp.asarray(self.turned), -1, 0)
         zero = jnp.zeros_like(heading)
         attitude = multiply(from_euler(zero, zero, heading), normalize(quaternion))
         return dataclasses.replace(
