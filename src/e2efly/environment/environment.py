@@ -363,7 +363,7 @@ class Env:
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
         linked = state.link and state.link.after(state.key_of(SENT), action, state.time)
-        arrived = actions if linked is None else linked.arrived
+        arrived = actions if linked is None else jnp.asarray(linked.arrived)
         old, new, switch = latency.acting_commands(self.command(arrived), state.action_latency, period)
         before, physics = state.vehicle, self._physics(state.family)
         plant = dataclasses.replace(physics.flown, **state.plant)
