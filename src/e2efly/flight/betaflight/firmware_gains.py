@@ -63,16 +63,16 @@ def _delay(vehicle: Vehicle) -> float:
     return max(DELAY_S - (vehicle.gyro_time_constant or 0.0), 0.0)
 
 
-def axis_lines(axis: int, pid: tuple[int, int, int]) -> tuple[str, ...]:
-    """The lines of the controller's command line that set P, I, D of an axis."""
-    return tuple(f"set {term}_{AXES[axis]}={value}" for term, value in zip("pid", pid, strict=True))
+def axis_lines(axis: str, pid: tuple[int, int, int], release: Release) -> tuple[str, ...]:
+    """The lines of the controller's command line that set P, I, D of an axis of `AXES`, and let D be."""
+    lines = (f"set {term}_{axis}={value}" for term, value in zip("pid", pid, strict=True))
+    return (*lines, f"set {release.d_boost}_{axis}=0")
 
 
 def gain_lines(gains: RateGains, release: Release) -> tuple[str, ...]:
     """The lines of the command line for all of a rate loop: also what would change the gains in flight is off."""
     return (
-        *(line for axis, pid in enumerate(gains.pid) for line in axis_lines(axis, pid)),
-        *(f"set {release.d_boost}_{axis}=0" for axis in AXES),
+        *(line for axis, pid in zip(AXES, gains.pid, strict=True) for line in axis_lines(axis, pid, release)),
         "set anti_gravity_gain=0",
         "set tpa_rate=0",
         "set pidsum_limit=1000",

@@ -167,10 +167,10 @@ def _rate_loop(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
     file, have = gains_of(vehicle), rate_gain_of(vehicle, info.gains.pid)
     rows = [
         Row(f"P, I, D of {name}", f"{_joined(pid)}: rate_gain about {gain:.0f} 1/s",
-            f"{_joined(own)}, by the vehicle file's rate_gain {need:g} 1/s", True, axis_lines(axis, own),
-            told=need / ALIKE < gain < need * ALIKE)
-        for axis, (name, pid, own, gain, need) in enumerate(
-            zip(AXES, info.gains.pid, file.pid, have, map(float, vehicle.rate_gain), strict=True)
+            f"{_joined(own)}, by the vehicle file's rate_gain {need:g} 1/s", True,
+            axis_lines(name, own, info.release), told=need / ALIKE < gain < need * ALIKE)
+        for name, pid, own, gain, need in zip(
+            AXES, info.gains.pid, file.pid, have, map(float, vehicle.rate_gain), strict=True
         )
     ]  # fmt: skip
     swell, idle = info.pid_advanced.anti_gravity_gain, info.motors.motor_idle
