@@ -332,6 +332,26 @@ def test_sticks_of_another_program_are_told_from_its_questions(code: int, steere
     assert not client.steered(0.1 + CROWDED_S + 0.01)
 
 
+@pytest.mark.parametrize(("spoilt", "foreign"), [(True, False), (False, True)])
+def test_on_a_lossy_line_a_late_reply_to_an_earlier_question_is_no_other_programs(spoilt: bool, foreign: bool) -> None:
+    """Of two questions the newer was taken for the answered one, and then the other answer comes."""
+    wire, client = acquainted()
+    client.poll(0.02)
+    client.set_raw_rc(STICKS, 0.1)
+    client.set_raw_rc(STICKS, 0.12)
+    wire.inbox = NOISE if spoilt else b""
+    client.poll(0.135)
+    wire.inbox = ACKNOWLEDGED
+    client.poll(0.14)
+    wire.inbox = ACKNOWLEDGED if spoilt else 2 * ACKNOWLEDGED
+    client.poll(0.145)
+    assert client.steered(0.15) is foreign and client.crowded(0.15) is foreign
+    assert client.backlog == 0
+    wire.inbox = ACKNOWLEDGED  # there was no third question
+    client.poll(0.15)
+    assert client.steered(0.16)
+
+
 def test_a_slow_radio_is_no_controller_that_is_behind() -> None:
     wire, client = begun(SCHEDULE, polled=False)
     delay, under_way, counts = 0.08, deque[tuple[float, bytes]](), Counter[int]()

@@ -131,10 +131,15 @@ def test_any_payload_parses_or_is_refused(kind: type, data: bytes) -> None:
 
 
 def test_what_stands_between_throttle_and_motors() -> None:
-    assert golden(settings_messages.PidAdvanced) == settings_messages.PidAdvanced(5, 100, 0, 0)
+    assert golden(settings_messages.PidAdvanced) == settings_messages.PidAdvanced(80, 5, 100, 0, 0)
     payload = bytearray(57)
-    payload[30], payload[47], payload[55], payload[56] = 1, 2, 3, 4
-    assert settings_messages.PidAdvanced.parse(bytes(payload)) == settings_messages.PidAdvanced(1, 2, 3, 4)
+    payload[21], payload[22], payload[30], payload[47], payload[55], payload[56] = 6, 1, 1, 2, 3, 4
+    assert settings_messages.PidAdvanced.parse(bytes(payload)) == settings_messages.PidAdvanced(262, 1, 2, 3, 4)
+
+
+def test_the_rate_loop_and_the_idle_of_the_motors_are_the_firmwares_defaults() -> None:
+    assert golden(settings_messages.PidGains).pid == ((45, 80, 30), (47, 84, 34), (45, 80, 0))
+    assert golden(settings_messages.AdvancedConfig).motor_idle == 0.055
 
 
 def test_a_map_that_is_no_permutation_is_refused() -> None:

@@ -21,7 +21,7 @@ from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.mode_slots import ModeRange
 from e2efly.flight.betaflight.row import Row, problems
 from e2efly.flight.betaflight.settings_check import NOT_TOLD, examine
-from e2efly.flight.betaflight.settings_messages import RxFailConfig
+from e2efly.flight.betaflight.settings_messages import PidGains, RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, sticks_of
 from e2efly.flight.pilot.delay_watch import MeasuredDelay
 from e2efly.flight.pilot.estimate import StateEstimate
@@ -56,7 +56,7 @@ class Recorded(Wire):
 
     def reply(self, frame: MspFrame) -> bytes:
         if frame.code != settings_by_name.CODE:
-            return bytes.fromhex(self.replies[str(frame.code)])
+            return bytes.fromhex((REPLIES["4.6.0"] | self.replies)[str(frame.code)])  # gains: of 4.6.0 alone
         key = f"{frame.code} {messages.text(frame.payload)}"
         if key not in self.replies:
             return encode(MspFrame(frame.code, direction=ERROR, version=2))
@@ -75,7 +75,7 @@ def rows_of(info: ControllerInfo, vehicle: object = VEHICLE) -> dict[str, Row]:
 def test_a_controller_that_is_set_as_the_guide_asks_may_take_off(version: str) -> None:
     info = recorded(version)
     assert info.firmware == version
-    packaged = {MotorTelemetry.CODE}  # recorded of the packaged firmware alone: tests/data/msp_golden.json
+    packaged = {MotorTelemetry.CODE, PidGains.CODE}  # recorded of the packaged firmware alone
     assert {int(code) for code in REPLIES[version] if code.isdigit()} >= set(MESSAGES) - packaged
     assert problems(examine(info, VEHICLE, FlightSettings())) == ()
     rows = rows_of(info)
@@ -214,6 +214,20 @@ def test_what_bends_the_throttle_is_refused(field: str, value: int, row: str, me
     found = rows_of(changed)[row]
     assert not found.good and found.mend == (mend,)
     assert len(problems(examine(changed, VEHICLE, FlightSettings()))) == 1
+
+
+def test_a_rate_loop_unlike_the_vehicle_files_is_shown_with_what_to_set_and_forbids_nothing() -> None:
+    info = recorded("4.6.0")
+    assert rows_of(info)["P, I, D of roll"].told  # recorded with the gains of this vehicle
+    light = rows_of(info, load_vehicle("crazyflie"))["P, I, D of roll"]
+    assert (light.value, light.told) == ("16, 3, 5: rate_gain about 38 1/s", False)
+    assert light.needed == "6, 1, 2, by the vehicle file's rate_gain 14 1/s"
+    assert light.mend == ("set p_roll=6", "set i_roll=1", "set d_roll=2", "set d_max_roll=0")
+    usual = rows_of(info)["anti_gravity_gain"]
+    assert (usual.value, usual.told, usual.mend) == ("80", False, ("set anti_gravity_gain=0",))
+    idle = rows_of(info)["idle of the motors"]
+    assert (idle.value, idle.told, idle.mend) == ("5.5%", False, ("set motor_idle=848",))
+    assert problems(examine(info, load_vehicle("crazyflie"), FlightSettings())) == ()
 
 
 def test_the_sticks_keep_angle_off_on_its_own_channel() -> None:

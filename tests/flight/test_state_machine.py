@@ -13,7 +13,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from e2efly.flight.pilot.fence import fence_problem, moved, stopping
+from e2efly.flight.pilot.fence import RIGHTING, fence_problem, moved, stopping
 from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.flight.pilot.hover import blind_time
 from e2efly.flight.pilot.landing import BEYOND_S, FAST, FOUND_S, SLOWED_S, has_stood
@@ -729,6 +729,36 @@ def test_the_guard_counts_what_passes_before_the_braking(
         z += v * dt
         v = v + falls * dt if i * dt < age + fence.reaction else min(v + fence.braking * dt, 0.0)
     assert problem or z > fence.low[2] - 0.01
+
+
+@hypothesis_settings(deadline=None)
+@given(st.floats(0.0, math.pi), st.floats(2.0, 8.0), st.floats(-4.0, 0.0), st.floats(5.0, 30.0), st.floats(0.0, 0.1))
+def test_the_guard_foresees_a_dive_whose_thrust_turns_with_the_vehicle(
+    pitch: float, rate: float, climb: float, thrust: float, age: float
+) -> None:
+    """A split-S: integrated in steps of 0.1 ms, while the nose comes up."""
+    fence = Fence(low=(-100.0, -100.0, 0.2), high=(100.0, 100.0, 100.0), speed=100.0, tilt=3.2)
+    quaternion = Rotation.from_euler("y", pitch).as_quat(scalar_first=True)
+    odometry = dataclasses.replace(
+        at(), velocity=np.array([3.0, 0.0, climb]), quaternion=quaternion, body_rate=np.array([0.0, -rate, 0.0])
+    )
+    wait, dt = age + fence.reaction + tilt_of(quaternion) / RIGHTING, 1e-4
+    t = np.arange(0.0, wait, dt) + dt / 2
+    falls = thrust * np.cos(pitch - rate * t) - GRAVITY
+    gain, way = falls.sum() * dt, (falls * (wait - t)).sum() * dt
+    then = climb + min(gain, 0.0)
+    needed = -(climb * wait + min(way, 0.0)) + then**2 / (2 * fence.braking)
+    for height, stops in ((0.2 + needed + 0.02, True), (0.2 + needed - 0.02, False)):
+        placed = dataclasses.replace(odometry, position=np.array([0.0, 0.0, height]))
+        problem = fence_problem(fence, placed, age=age, force=np.array([0.0, 0.0, thrust]))
+        assert height < fence.low[2] or (problem is None) is stops
+
+
+def test_where_a_fence_reaches_below_the_ground_nobody_is_sent_there() -> None:
+    fence = Fence(low=(-9.0, -9.0, -9.0), high=(9.0, 9.0, 9.0))
+    dives = dataclasses.replace(at(), position=np.array([0.0, 0.0, 1.0]), velocity=np.array([0.0, 0.0, -4.0]))
+    assert stopping(fence, dives).position[2] < 0
+    assert stopping(fence, dives, ground=0.5).position[2] > 1.0  # it brakes as hard as it can
 
 
 @hypothesis_settings(deadline=None)

@@ -36,6 +36,14 @@ CLIMB_S = 6.0
 """Time for take-off and climb, s."""
 
 
+QUICKER = tuple(
+    f"set {term}_{axis}={value}"
+    for axis, pid in (("roll", (40, 40, 50)), ("pitch", (42, 40, 55)), ("yaw", (120, 20, 100)))
+    for term, value in zip("pid", pid, strict=True)
+)
+"""A tune of VIS-R that is quicker than its file says: 63 % of a step of roll rate in 45 ms, with 20 % overshoot."""
+
+
 @dataclass(frozen=True)
 class SetpointStep:
     """A change of one of the four commands, from rest."""

@@ -97,7 +97,7 @@ def test_without_airmode_torque_at_low_throttle_is_scaled_down(off: Session) -> 
 
 
 def test_what_bends_the_throttle_is_read_and_refused(bent: Session) -> None:
-    assert bent.info.pid_advanced == PidAdvanced(7, 91, 0, 21)
+    assert bent.info.pid_advanced == PidAdvanced(0, 7, 91, 0, 21)
     named = [problem.split()[0] for problem in bent.bridge.settings_problems]
     assert named == ["motor_output_limit", "throttle_boost", "thrust_linear"]
     bent.fly(0.5)

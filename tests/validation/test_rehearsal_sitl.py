@@ -8,7 +8,7 @@ import pytest
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import load_policy
-from e2efly.validation import firmware_program
+from e2efly.validation import firmware_program, rehearsal
 from e2efly.validation.rehearsal import rehearse
 from e2efly.vehicles.loading import load_vehicle
 
@@ -39,3 +39,19 @@ def test_the_guard_ends_no_race_that_flies_high_enough() -> None:
     assert flight.complete, flight.reasons
     assert flight.success
     assert flight.top_speed > 9.0
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(("vehicle", "task"), [("crazyflie", "hover"), ("crazyflie", "race"), ("vis_h", "race")])
+def test_the_firmware_flies_the_smaller_vehicles_by_their_own_gains(vehicle: str, task: str) -> None:
+    flight = rehearse(firmware_program.chosen(), load_policy(f"{vehicle}/{task}"), load_vehicle(vehicle), seed=3)
+    assert flight.complete and flight.success, (flight.told, flight.reasons)
+
+
+@pytest.mark.whole
+def test_a_flight_that_touches_the_ground_before_its_landing_is_not_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`pid` does not catch this race's end over a latency of 90 ms, while the policy itself has done its laps."""
+    monkeypatch.setattr(rehearsal, "HOVER", "pid")
+    flight = rehearse(firmware_program.chosen(), load_policy("vis_h/race"), load_vehicle("vis_h"), seed=3)
+    assert flight.done and flight.success and not flight.complete
+    assert flight.told.endswith(", touched the ground")

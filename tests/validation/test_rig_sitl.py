@@ -13,6 +13,7 @@ from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import AttitudeReply, Rc, StatusEx, set_raw_rc
 from e2efly.flight.betaflight.sticks import Sticks, sticks_of
+from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig
 from e2efly.validation.world import FlownBody
@@ -179,14 +180,14 @@ def test_it_hovers_where_thrust_equals_weight(bench: Bench) -> None:
     rig = bench.rig
     rig.state = replace(rig.state, position=np.array([0.0, 0.0, 3.0]))
     rig.held = True
-    share = math.sqrt(9.81 / 4 * VEHICLE.mass / VEHICLE.thrust_range[1])
+    share = ThrottleMap.of(VEHICLE).throttle(9.81)
     bench.send(0.4, share)
     rig.held = False
     before = rig.state.velocity[2]
     rotors = np.full(4, rig.world.full_speed * float(np.mean(rig.sitl.motors())))
     rig.state = replace(rig.state, rotor_speed=rotors)
     bench.send(0.2, share)
-    assert abs(rig.state.velocity[2] - before) / 0.2 < 1.0
+    assert abs(rig.state.velocity[2] - before) / 0.2 < 0.2
 
 
 @pytest.mark.whole(but=1)

@@ -11,15 +11,15 @@ from e2efly.validation import firmware_program
 from e2efly.validation.rehearsal import LINK_S
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
-from tests.validation.steps import SIZES, fly_steps
+from tests.validation.steps import QUICKER, SIZES, fly_steps
 
 VEHICLE = load_vehicle("vis_r")
 
 
 @pytest.mark.whole
 def test_the_simulator_is_aligned_with_the_firmware(tmp_path: Path) -> None:
-    """Betaflight's rate loop is quicker than the file's, which held-out time shows."""
-    with Rig(firmware_program.chosen(), tmp_path, VEHICLE) as rig:
+    """A rate loop that is quicker than the file's, which held-out time shows."""
+    with Rig(firmware_program.chosen(), tmp_path, VEHICLE, settings=QUICKER) as rig:
         record, steps = fly_steps(rig, (1.0,))
     assert [(s.channel, s.size) for s in steps] == list(enumerate(SIZES))
     sent = record.streams["command"]

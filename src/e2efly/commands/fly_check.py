@@ -57,7 +57,10 @@ def print_settings(console: Console, rows: tuple[Row, ...]) -> None:
     unknown = [row for row in rows if not row.told]
     for heading, lines in (
         ("# no: type these lines into the controller's command line", command_lines(r for r in rows if not r.good)),
-        ("# look: `get NAME` shows these; type the lines of those that are not as needed", command_lines(unknown)),
+        (
+            "# look: `get NAME` shows what these are; type the lines of those that should be as needed",
+            command_lines(unknown),
+        ),
     ):
         for line in (heading, *lines, "save") if lines else ():
             console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -25,6 +25,7 @@ from e2efly.policy.goal import Course
 from e2efly.policy.runtime import Acting, Envelope, Runtime
 from e2efly.policy.worker import PolicyWorker
 from e2efly.validation.rig import Rig
+from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 REACH = 20.0
@@ -176,3 +177,17 @@ def rehearsal_settings(height: float, reach: float = REACH, fence: Fence | None 
         FlightSettings(), takeoff_height=height, takeoff_speed=0.8, land_speed=0.6, battery_unknown=True,
         fence=fence or wide,
     )  # fmt: skip
+
+
+def open_fence(vehicle: Vehicle, reach: float) -> Fence:
+    """A fence of a rehearsal that only ends what has gone astray: `reach` m in each direction, below the ground, too. A
+    race dives so near to the ground that a guard at a floor would end good flights. What touches the ground is seen.
+    """
+    return Fence(
+        low=(-reach, -reach, -reach), high=(reach, reach, reach), speed=20.0, tilt=3.1, braking=braking_of(vehicle)
+    )
+
+
+def braking_of(vehicle: Vehicle) -> float:
+    """The deceleration that a guard may count on, m/s^2: half of what full thrust has over the weight."""
+    return (vehicle.thrust_to_weight - 1) * GRAVITY / 2

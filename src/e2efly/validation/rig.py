@@ -16,11 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
+from e2efly.flight.betaflight.firmware_gains import gain_lines, gains_of
+from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
+from e2efly.flight.betaflight.versions import Release
+from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.policy.odometry import Sample
 from e2efly.simulation.device import compute_at_once, one_core
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.sitl import FirmwareState, Sitl
 from e2efly.validation.world import FlownBody, World
+from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 STEP_S = 0.002
@@ -53,11 +58,9 @@ SETTINGS = (
     "aux 1 50 1 1700 2100 0 0",  # MSP override: AUX2
     "aux 2 1 2 925 2100 0 0",  # angle: AUX3, at any position of the pilot's switch; the bridge sends 900 there
     "set msp_override_channels_mask=79",
-    "rxfail 3 s 1575",  # without the receiver: a throttle that sinks slowly ...
-    "rxfail 6 s 2000",  # ... and angle
+    "rxfail 6 s 2000",  # without the receiver: angle, and a throttle that sinks slowly (`vehicle_lines`)
     "aux 3 27 8 1700 2100 0 0",  # FAILSAFE: AUX9, for firmware that takes a lost signal for the last frame
     "set failsafe_procedure=AUTO-LAND",
-    "set failsafe_throttle=1575",
     "set failsafe_delay=5",
     "set max_aux_channels=14",  # otherwise the copies of throttle and yaw on channels 11 and 12 are not read
     "set rates_type=ACTUAL",
@@ -67,9 +70,6 @@ SETTINGS = (
     "set rc_smoothing=OFF",
     "set feedforward_transition=0",
     *(f"set f_{axis}=0" for axis in ("roll", "pitch", "yaw")),  # noise of the setpoint must not be amplified
-    *(f"set p_{axis}={p}" for axis, p in (("roll", 40), ("pitch", 42), ("yaw", 120))),  # tuned: 63 % of a step in
-    *(f"set i_{axis}={i}" for axis, i in (("roll", 40), ("pitch", 40), ("yaw", 20))),  # 45 ms, with 20 % overshoot
-    *(f"set d_{axis}={d}" for axis, d in (("roll", 50), ("pitch", 55), ("yaw", 100))),
     "set iterm_relax=RPY",
     "set small_angle=180",
     "set acc_calibration=0,0,0,1",
@@ -77,7 +77,10 @@ SETTINGS = (
     "set deadband=0",
     "set yaw_deadband=0",
 )
-"""Settings of the firmware, as lines of its own command line. docs/hardware requires the same of a real controller."""
+"""Settings of the firmware, as lines of its own command line. docs/hardware requires the same of a real controller.
+What differs from vehicle to vehicle is in `vehicle_lines`."""
+FAILSAFE_STEP = 25
+"""Steps of the throttle without a receiver, us. It is one to two steps below hovering."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ class Rig:
 
     Time is virtual. With `real_time` it follows the machine's clock, as for a bridge in another process. `step` is the
     interval at which sensors are updated and motors are read, s, a whole number of ms. `settings` are added to
-    `SETTINGS`. `pose_noise` replaces `POSE_NOISE`.
+    `SETTINGS` and to the lines of `vehicle`. `pose_noise` replaces `POSE_NOISE`.
     """
 
     def __init__(
@@ -128,7 +131,8 @@ class Rig:
         pose_noise: tuple[float, ...] = POSE_NOISE,
     ) -> None:
         compute_at_once()
-        self._step, self._settings = step, (*SETTINGS, *settings)
+        self._step = step
+        self._settings = (*vehicle_lines(vehicle, firmware.release), *SETTINGS, *settings)
         self.sitl = Sitl(firmware, folder)
         self.thrust_shares = np.ones(4)
         """Thrust of each rotor divided by the thrust from the vehicle's thrust map."""
@@ -282,6 +286,13 @@ class Rig:
         )
         quaternion = np.asarray(s.quaternion) + self._pose_noise[3] / 2 * noise.normal(size=4)
         return Sample(now, position, quaternion / np.linalg.norm(quaternion), now, velocity, rate)
+
+
+def vehicle_lines(vehicle: Vehicle, release: Release) -> tuple[str, ...]:
+    """The firmware's settings for a vehicle: the gains of the rate loop, and the throttle without a receiver."""
+    hover = ThrottleCurve().channel_for(ThrottleMap.of(vehicle).throttle(GRAVITY))
+    sinks = (hover // FAILSAFE_STEP - 1) * FAILSAFE_STEP
+    return (*gain_lines(gains_of(vehicle), release), f"rxfail 3 s {sinks}", f"set failsafe_throttle={sinks}")
 
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:

@@ -24,7 +24,7 @@ MESSAGES: dict[int, Any] = {
         settings_messages.MixerConfig, settings_messages.RxConfig, settings_messages.RxMap,
         settings_messages.FailsafeConfig, settings_messages.RxFailConfig,
         settings_messages.PidAdvanced, settings_messages.RcTuning, mode_slots.BoxIds, settings_messages.RcDeadband,
-        settings_messages.MotorConfig,
+        settings_messages.MotorConfig, settings_messages.PidGains, settings_messages.AdvancedConfig,
     )
 }  # fmt: skip
 """The messages that can be parsed, by code."""
@@ -115,6 +115,7 @@ class Client:
     """The decoder of the frames. It counts bad checksums and skipped bytes."""
     _asked: dict[int, float] = field(default_factory=dict)
     _awaited: deque[tuple[int, float]] = field(default_factory=deque)
+    _lost: deque[tuple[int, float]] = field(default_factory=deque)
     _due: dict[int, float] = field(default_factory=dict)
     _sizes: dict[int, int] = field(default_factory=dict)
     _connection: int = 0
@@ -211,10 +212,14 @@ class Client:
 
     def _strike_off(self, code: int, now: float) -> float:
         """Remove the request of a reply from the awaited ones. The controller answers in order, so the replies to
-        earlier requests are lost. It is the first request of this code, or on a lossy line the latest that fits.
+        earlier requests are lost. It is the first request of this code, or on a lossy line the latest that fits. There,
+        a request that counted as lost may be answered yet: that is no other program's answer.
         """
         fitting = [k for k, (awaited, _) in enumerate(self._awaited) if awaited == code]
         if not fitting:
+            if now - self._spoilt < FORGOTTEN and (late := [entry for entry in self._lost if entry[0] == code]):
+                self._lost.remove(late[0])
+                return late[0][1]
             self._foreign = now
             self._steered = now if code == messages.SET_RAW_RC else self._steered
             return now
@@ -229,6 +234,8 @@ class Client:
             if not given_up:
                 self._asked.pop(earlier, None)
             self.timeouts += k < chosen and not given_up
+            if k < chosen:
+                self._lost.append((earlier, asked))
         return asked
 
     def _timeout(self, now: float) -> float:
@@ -248,6 +255,8 @@ class Client:
             if code == messages.SET_RAW_RC:
                 self.backlog, self.timeouts = self.backlog - 1, self.timeouts + 1
                 late.append(code)
+        while self._lost and now - self._lost[0][1] > FORGOTTEN:
+            self._lost.popleft()
         if late and self.decoder.pending:  # the bytes held back may not be a frame at all
             for frame in self.decoder.flush():
                 self._take(frame, now)
@@ -280,6 +289,7 @@ class Client:
         self._connection = self.link.connections
         self._asked.clear()
         self._awaited.clear()
+        self._lost.clear()
         self._due.clear()
         self.latest.clear()
         self.errors.clear()

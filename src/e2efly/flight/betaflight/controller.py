@@ -56,6 +56,10 @@ class ControllerInfo:
     """Settings that act between throttle and motors."""
     mixer: settings_messages.MixerConfig
     """Kind of vehicle."""
+    gains: settings_messages.PidGains
+    """Gains of the rate loop."""
+    motors: settings_messages.AdvancedConfig
+    """How the motors are driven."""
     alignment: settings_messages.BoardAlignment
     """How the board is rotated in the airframe."""
     by_name: tuple[tuple[str, str], ...] = ()
@@ -118,6 +122,8 @@ def identify(client: Client, timeout_s: float = 1.0, clock: Clock = MONOTONIC) -
         motor=get(settings_messages.MotorConfig),
         pid_advanced=get(settings_messages.PidAdvanced),
         mixer=get(settings_messages.MixerConfig),
+        gains=get(settings_messages.PidGains),
+        motors=get(settings_messages.AdvancedConfig),
         alignment=get(settings_messages.BoardAlignment),
         by_name=settings_by_name.read(client, timeout_s, clock) if release.tells_settings else (),
     )

@@ -19,7 +19,8 @@ class Row:
     mend: tuple[str, ...] = ()
     """Whole lines for the controller's command line that correct it."""
     told: bool = True
-    """Whether the controller reports the setting. If not, its value is unknown, and the pilot should type `mend`."""
+    """Whether the controller reports the setting, and the report decides. If not, the pilot should look, and type
+    `mend` unless it is better as it is."""
 
     @property
     def problem(self) -> str:

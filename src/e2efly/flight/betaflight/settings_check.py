@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import degrees
 
 from e2efly.flight.betaflight.controller import ControllerInfo
+from e2efly.flight.betaflight.firmware_gains import axis_lines, gains_of, rate_gain_of
 from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.rates import AXES
 from e2efly.flight.betaflight.row import Row
@@ -32,6 +33,10 @@ AIR_MODE = 28
 """Permanent id of the mode AIR MODE."""
 SINKING = 0.97
 """The share of the weight that a throttle stick in its middle is set to hold, where it would hold more than all."""
+ALIKE = 1.25
+"""A rate loop is as the vehicle file says if its gain is within this factor of the file's."""
+IDLE = 0.02
+"""The difference between the idle of the motors and the vehicle file's that the throttle map makes up for."""
 NOT_TOLD = "not told by this firmware"
 """The value that is shown for a setting that cannot be read."""
 
@@ -51,6 +56,7 @@ def examine(
         *_rates(info, vehicle, contract),
         *_throttle(info),
         *_mixing(info),
+        *_rate_loop(info, vehicle),
         *switch_rows(info, settings),
         *_hand_back(info, vehicle),
         *_by_name(info, settings),
@@ -152,6 +158,33 @@ def _mixing(info: ControllerInfo) -> list[Row]:
         needed = "0: the bridge learns the throttle map itself"
         rows.append(Row(name, str(have), needed, have == 0, (f"set {name}=0",)))
     return rows
+
+
+def _rate_loop(info: ControllerInfo, vehicle: Vehicle) -> list[Row]:
+    """The rate loop beside the vehicle file's. The file may be wrong about a real vehicle, so none of it forbids a
+    flight.
+    """
+    file, have = gains_of(vehicle), rate_gain_of(vehicle, info.gains.pid)
+    rows = [
+        Row(f"P, I, D of {name}", f"{_joined(pid)}: rate_gain about {gain:.0f} 1/s",
+            f"{_joined(own)}, by the vehicle file's rate_gain {need:g} 1/s", True,
+            axis_lines(name, own, info.release), told=need / ALIKE < gain < need * ALIKE)
+        for name, pid, own, gain, need in zip(
+            AXES, info.gains.pid, file.pid, have, map(float, vehicle.rate_gain), strict=True
+        )
+    ]  # fmt: skip
+    swell, idle = info.pid_advanced.anti_gravity_gain, info.motors.motor_idle
+    return [
+        *rows,
+        Row("anti_gravity_gain", str(swell), "0: gains grow while a policy moves the throttle", True,
+            ("set anti_gravity_gain=0",), told=swell == 0),
+        Row("idle of the motors", f"{idle:.1%}", f"{file.idle:.1%}, by the vehicle file's rotor_speed_min", True,
+            info.release.idle_lines(file.idle), told=abs(idle - file.idle) <= IDLE),
+    ]  # fmt: skip
+
+
+def _joined(pid: tuple[int, int, int]) -> str:
+    return ", ".join(map(str, pid))
 
 
 def _by_name(info: ControllerInfo, settings: FlightSettings) -> list[Row]:

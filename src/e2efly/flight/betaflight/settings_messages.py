@@ -148,10 +148,41 @@ class RxFailConfig:
 
 
 @dataclass(frozen=True)
+class PidGains:
+    """Gains of the rate loop in the active PID profile."""
+
+    CODE: ClassVar[int] = 112
+    pid: tuple[tuple[int, int, int], ...]
+    """P, I, D of roll, pitch and yaw."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "PidGains":
+        """Read a reply."""
+        v = unpack("PID", "9B", payload)
+        return PidGains(((v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])))
+
+
+@dataclass(frozen=True)
+class AdvancedConfig:
+    """How the motors are driven."""
+
+    CODE: ClassVar[int] = 90
+    motor_idle: float
+    """Output of an idling motor, 0 to 1: `motor_idle`, before MSP 1.47 `dshot_idle_value`."""
+
+    @staticmethod
+    def parse(payload: bytes) -> "AdvancedConfig":
+        """Read a reply."""
+        return AdvancedConfig(unpack("ADVANCED_CONFIG", "6xH", payload)[0] / 10_000)
+
+
+@dataclass(frozen=True)
 class PidAdvanced:
     """Settings of the active PID profile that act between throttle and motors."""
 
     CODE: ClassVar[int] = 94
+    anti_gravity_gain: int
+    """How much the gains of the rate loop grow while the throttle moves. 0: not at all."""
     throttle_boost: int
     """How much a fast change of the throttle is amplified. 0: not at all."""
     motor_output_limit: int
@@ -164,8 +195,7 @@ class PidAdvanced:
     @staticmethod
     def parse(payload: bytes) -> "PidAdvanced":
         """Read a reply."""
-        boost, limit, sag, linear = unpack("PID_ADVANCED", "30xB16xB7xBB", payload)
-        return PidAdvanced(boost, limit, sag, linear)
+        return PidAdvanced(*unpack("PID_ADVANCED", "21xH7xB16xB7xBB", payload))
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,17 @@ class Release:
             return "held for as long as override is on"
         return f"handed back to the receiver after {self.override_timeout:g} s"
 
+    @property
+    def d_boost(self) -> str:
+        """The beginning of the settings (`d_max_roll`) with which D grows in fast turns. 0: it does not."""
+        return "d_max" if self.api >= (1, 47) else "d_min"
+
+    def idle_lines(self, share: float) -> tuple[str, ...]:
+        """The lines of the command line for the output of idling motors, 0 to 1, whichever protocol they speak."""
+        if self.api >= (1, 47):
+            return (f"set motor_idle={10_000 * share:.0f}",)
+        return f"set dshot_idle_value={10_000 * share:.0f}", f"set min_throttle={1000 + 1000 * share:.0f}"
+
 
 _BEFORE = SitlLayout(motors=(3, 0, 1, 2), yaw_sign=-1, hears_silence=False)
 _SINCE_2026 = SitlLayout(

@@ -1,6 +1,7 @@
 """Where the vehicle may be: the fence, the guard that acts before it is reached, and targets that stay inside."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,8 +29,8 @@ def fence_problem(
 ) -> str | None:
     """Why the vehicle is outside the fence, or can no longer stop inside it. None: neither. `floor` tells whether the
     lowest height counts, and `guard` whether it counts if the vehicle cannot stop inside. `age` is that of the
-    odometry, s. `force` is (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last. None: not
-    known.
+    odometry, s. `force` is (3,) specific force, body FLU, m/s^2. Until the braking takes effect, it may last, and turns
+    with the body. None: not known.
     """
     v = odometry.velocity
     speed, tilt = float(np.linalg.norm(v)), tilt_of(odometry.quaternion)
@@ -68,10 +69,12 @@ def here(odometry: Odometry) -> Target:
     return Target((x, y, z), yaw_of(odometry.quaternion))
 
 
-def stopping(fence: Fence, odometry: Odometry) -> Target:
+def stopping(fence: Fence, odometry: Odometry, ground: float = -math.inf) -> Target:
     """Where the vehicle can come to rest. Along an axis on which this is outside the fence, it is sent back by as much
-    as it needs to stop, so that it brakes as hard as it can. The target is always inside the fence.
+    as it needs to stop, so that it brakes as hard as it can. The target is always inside the fence, and over `ground`,
+    m, where the fence reaches below it.
     """
+    fence = replace(fence, low=(*fence.low[:2], max(fence.low[2], ground)))
     stops = _stop(fence, odometry)
     leaves = (stops < fence.low) | (stops > fence.high)
     place = np.where(leaves, 2 * odometry.position - stops, stops)
@@ -99,14 +102,31 @@ def moved(settings: FlightSettings, target: Target, pilot: Pilot, dt: float) -> 
 
 def _stop(fence: Fence, odometry: Odometry, age: float = 0.0, force: np.ndarray | None = None) -> np.ndarray:
     """(3,) m: where the vehicle comes to rest, computed for each axis separately: at its present speed until it is
-    upright and the braking takes effect, then braking. A present acceleration that makes it faster lasts until then.
+    upright and the braking takes effect, then braking. What the present force changes until then counts where it leads
+    farther or faster. The force turns with the body.
     """
     v, wait = odometry.velocity, age + fence.reaction + tilt_of(odometry.quaternion) / RIGHTING
-    if force is None:
-        gain = np.zeros(3)
-    else:
-        a = Quat(*odometry.quaternion.tolist()).rotate(Vec3(*force.tolist()))
-        gain = np.array([a.x, a.y, a.z - GRAVITY])
-        gain = wait * np.where(gain * v >= 0, gain, 0.0)
+    way = gain = np.zeros(3)
+    if force is not None:
+        gain, way = (np.where(change * v >= 0, change, 0.0) for change in _pushed(odometry, force, wait))
     then = v + gain
-    return odometry.position + (v + gain / 2) * wait + then * np.abs(then) / (2 * fence.braking)
+    return odometry.position + v * wait + way + then * np.abs(then) / (2 * fence.braking)
+
+
+def _pushed(odometry: Odometry, force: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) each, m/s and m: what gravity and a force that turns with the body change of velocity and position.
+
+    With the body rate w, the angle a = |w| t and the unit axis n, the force is f(t) = n (n.f) + (f - n (n.f)) cos a +
+    (n x f) sin a (Rodrigues), here integrated once and twice.
+    """
+    attitude = Quat(*odometry.quaternion.tolist())
+    turned = (attitude.rotate(Vec3(*vector.tolist())) for vector in (force, odometry.body_rate))
+    f, w = (np.array([vector.x, vector.y, vector.z]) for vector in turned)
+    rate = max(float(np.linalg.norm(w)), 1e-4)
+    angle, n = rate * seconds, w / rate
+    along = n * float(n @ f)
+    across, side = f - along, np.cross(n, f)
+    steady = along - (0.0, 0.0, GRAVITY)
+    bent = 2 * math.sin(angle / 2) ** 2  # 1 - cos
+    gain = steady * seconds + (across * math.sin(angle) + side * bent) / rate
+    return gain, steady * seconds**2 / 2 + (across * bent + side * (angle - math.sin(angle))) / rate**2

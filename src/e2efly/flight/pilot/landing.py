@@ -64,7 +64,7 @@ def _down_from(settings: FlightSettings, odometry: Odometry) -> Target:
     """Where the vehicle can stop, but no higher than it is. A vehicle that has nearly landed must not rise to the
     fence's floor.
     """
-    target = stopping(settings.fence, odometry)
+    target = stopping(settings.fence, odometry, settings.ground_height)
     x, y, z = target.position
     return dataclasses.replace(target, position=(x, y, min(z, float(odometry.position[2]))))
 

@@ -242,7 +242,13 @@ def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
     else:
         reasons = policy_refusals(settings, flight, inputs, inputs.odometry)
     if reasons:
-        return to(flight, Mode.HOVER, *reasons, target=stopping(settings.fence, inputs.odometry), lock=True)
+        return to(
+            flight,
+            Mode.HOVER,
+            *reasons,
+            target=stopping(settings.fence, inputs.odometry, settings.ground_height),
+            lock=True,
+        )
     return flight
 
 
