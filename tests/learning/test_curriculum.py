@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.config import StageConfig, TrainConfig
+from e2efly.config import DisturbanceConfig, EnvConfig, EstimateConfig, LinkConfig, Robust, StageConfig, TrainConfig
 from e2efly.learning.runner import train
 from e2efly.learning.setup import Setup
 from e2efly.runs import presets
-from e2efly.runs.inputs import from_json, to_json
+from e2efly.runs.inputs import fingerprint, from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from tests.learning.test_runner import Silent, small
 
@@ -27,6 +27,42 @@ def test_stages_differ_in_numbers_and_end_with_the_task() -> None:
     assert (first.env.task.config.position, second.env.task.config.position) == (0.1, 1.0)
     assert second.env.task.config.velocity == last.env.task.config.velocity == 1.0
     assert last.env.task.config == small().task and last.config is None
+
+
+def test_a_stage_has_a_share_of_what_an_episode_draws() -> None:
+    env = EnvConfig(
+        randomize={"mass": 0.2},
+        wind=2.0,
+        latency_spread=(0.01, 0.02),
+        disturbance=DisturbanceConfig(gust=1.0),
+        estimate=EstimateConfig(yaw=0.1, hold=4.0),
+        link=LinkConfig(dropped=0.1),
+    )
+    config = dataclasses.replace(with_stages(StageConfig({}, steps=512, strength=0.5)), env=env)
+    first, last = (stage.env for stage in Setup.of(config).stages)
+    assert (first.randomize, first.wind) == ({"mass": 0.1}, 1.0)
+    assert first.disturbance == DisturbanceConfig(gust=0.5)
+    assert (first.estimate, first.link) == (EstimateConfig(yaw=0.05, hold=2.0), LinkConfig(dropped=0.05))
+    latency = float(first.physics.nominal.latency)
+    assert first.latency_range == pytest.approx([latency - 0.005, latency + 0.01])
+    assert (last.estimate, last.randomize) == (env.estimate, env.randomize)
+
+
+def test_a_recipe_begins_with_a_share_of_the_draws() -> None:
+    recipe = Robust(steps=3072, eased=(0.4, 1024))
+    assert recipe.into(small()).curriculum == (StageConfig({}, steps=1024, strength=0.4),)
+    assert recipe.into(with_stages(NEAR)).curriculum == (StageConfig(NEAR.changes, steps=1024, strength=0.4), NEAR)
+
+
+def test_files_from_before_a_field_was_added_are_read_and_define_the_same_training() -> None:
+    config = with_stages(NEAR)
+    content = json.loads(json.dumps(to_json(config)))
+    known = fingerprint(config)
+    del content["env"]["estimate"], content["env"]["link"], content["curriculum"][0]["strength"]
+    assert from_json(content, "old") == config
+    assert fingerprint(from_json(content, "old")) == known
+    late = dataclasses.replace(config, env=dataclasses.replace(config.env, link=LinkConfig(dropped=0.1)))
+    assert fingerprint(late) != known
 
 
 @pytest.mark.parametrize(

@@ -121,11 +121,15 @@ class Robust:
     start_from: str | None = None
     """The policy of the zoo whose weights the training starts from. None: fresh weights, or as the recipe says."""
     eased: tuple[float, int] | None = None
-    """A first stage: its `StageConfig.strength`, and its environment steps. None: there is none."""
+    """A first stage: its `StageConfig.strength`, and its environment steps. It has the changes of the recipe's own first
+    stage. None: there is none."""
 
     def into(self, config: "TrainConfig") -> "TrainConfig":
         """A configuration that learns in this way."""
-        given = config.reward.parameters
+        given, curriculum = config.reward.parameters, config.curriculum
+        if self.eased is not None:
+            changes = curriculum[0].changes if curriculum else {}
+            curriculum = (StageConfig(changes, strength=self.eased[0], steps=self.eased[1]), *curriculum)
         return replace(
             config,
             network=replace(config.network, recurrent=self.recurrent, hidden=self.hidden),
@@ -134,9 +138,7 @@ class Robust:
             if self.weights is None
             else RewardConfig(dict(self.weights), {**given, **self.parameters}),
             start_from=self.start_from or config.start_from,
-            curriculum=config.curriculum
-            if self.eased is None
-            else (StageConfig({}, strength=self.eased[0], steps=self.eased[1]), *config.curriculum),
+            curriculum=curriculum,
             steps=self.steps,
             chunk=self.chunk,
         )

@@ -36,7 +36,8 @@ def still(env: Env) -> Env:
     env = dataclasses.replace(env, family=None, noise=None).undisturbed()
     imu = env.imu and dataclasses.replace(env.imu, **dict.fromkeys(NOISY, 0.0))
     late = np.full_like(env.observation_latency_range, np.mean(env.observation_latency_range))
-    return held(dataclasses.replace(env, disturbance=None, imu=imu, observation_latency_range=late))
+    exact: Any = {"disturbance": None, "estimate": None, "link": None}
+    return held(dataclasses.replace(env, imu=imu, observation_latency_range=late, **exact))
 
 
 def beginnings(env: Env, starts: int) -> EnvState:
