@@ -3,7 +3,7 @@ configuration and the curve of its training.
 
     python benchmarks/zoo.py [--vehicles vis_r ...] [--tasks hover ...] [--seeds 3]
     python benchmarks/zoo.py --digests
-    python benchmarks/zoo.py --again
+    python benchmarks/zoo.py --again [--missing]
     python benchmarks/zoo.py --runs DIR ...
     python benchmarks/zoo.py --images
     python benchmarks/zoo.py --domains
@@ -13,9 +13,10 @@ more often than not; none more is made once one meets 99.5 %, or a robust one 97
 is best the runs' own reports say, and of robust ones those rows, from starts of their own; of a family's, unseen
 vehicles in still air. The rows from laws that no training draws from choose nothing. The success that is stated is that
 of the lone ONNX file, of the 1000 starts of `e2efly eval` and `eval --stress`, which nothing was chosen by; in the
-rows, of a policy that sees, of the first 250 of them.
+rows, of a policy that sees, of the first 250 of them, and in those rows alone that trainings draw from.
 
-`--again` trains nothing: it flies the robust policies that are there in all rows of the stress.
+`--again` trains nothing: it flies the robust policies that are there in all rows of the stress, or with `--missing` in
+those that zoo.json does not have, and all at once.
 `--runs` trains nothing: it keeps the policies of finished runs, by the presets that are meant here.
 `--images` trains nothing: it keeps images of the starts of the policies that see, which have none beside them.
 `--domains` trains nothing: it writes into the contract of each file that says nothing of its courses, vehicles or
@@ -33,6 +34,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +57,7 @@ from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import candidate
+from e2efly.validation.stress import every_row
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
@@ -96,9 +99,14 @@ def stressed(policy: Path, folder: Path, *options: str) -> dict[str, dict[str, f
     }
 
 
-def starts(task: str) -> tuple[str, ...]:
-    """The option for the number of starts per row."""
-    return ("--episodes", str(SEEN)) if task in TASKS and TASKS[task].cameras else ()
+def measured(task: str, known: Collection[str] = ()) -> tuple[str, ...]:
+    """The options of the stress that zoo.json tells: all rows but the known ones. A policy that sees, which takes
+    minutes, has fewer starts, and those rows alone that trainings draw from.
+    """
+    cameras = TASKS[task].cameras if task in TASKS else ()
+    rows = rows_for(cameras) if cameras else every_row(cameras)
+    new = [row for row in rows if row not in known or row == ALL]  # all at once has the new ones, too
+    return (*(("--episodes", str(SEEN)) if cameras else ()), "--rows", *new)
 
 
 def recipe(vehicle: str, task: str) -> tuple[str, str]:
@@ -135,7 +143,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often
         if TASKS[task].cameras:
             more |= {"mean_speed_m_s": {name: suite["mean_speed_m_s"] for name, suite in suites.items()}}
-        more |= stressed(out / "policy.onnx", folder, *starts(task))
+        more |= stressed(out / "policy.onnx", folder, *measured(task))
     return reported, {
         "algorithm": summary["algorithm"],
         "seed": summary["seed"],
@@ -233,6 +241,7 @@ def main() -> None:
         digests=False,
         domains=False,
         again=False,
+        missing=False,
         images=False,
         runs=[],
     )
@@ -258,10 +267,13 @@ def main() -> None:
             about = zoo[vehicle].get(task, {})
             if about.get("preset") == "robust" and vehicle not in family_names():
                 with tempfile.TemporaryDirectory() as folder:
-                    about |= stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder), *starts(task))
+                    known = {*about["stress"], *about.get("untrained", ())} if options.missing else ()
+                    found = stressed(FOLDER / vehicle / f"{task}.onnx", Path(folder), *measured(task, known))
+                if options.missing:
+                    found = {kind: about.get(kind, {}) | rows for kind, rows in found.items()}
+                about |= {kind: rows for kind, rows in found.items() if rows}
                 write(contents() | {vehicle: contents()[vehicle] | {task: about}})
-                worst = min(about["untrained"].values())
-                print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}, {worst:.3f} untrained", flush=True)
+                print(vehicle, task, f"{about['stress'][ALL]:.3f} {ALL}", flush=True)
         return
     rows = []
     for out in map(Path, options.runs):

