@@ -121,8 +121,8 @@ class Robust:
     start_from: str | None = None
     """The policy of the zoo whose weights the training starts from. None: fresh weights, or as the recipe says."""
     eased: tuple[float, int] | None = None
-    """A first stage: its `StageConfig.strength` and its environment steps. Its changes are those of the recipe's own first
-    stage. None: there is none."""
+    """A first stage: its `StageConfig.strength` and its environment steps. Its changes are those of the recipe's own
+    first stage. None: there is none."""
 
     def into(self, config: "TrainConfig") -> "TrainConfig":
         """A configuration that learns in this way."""
