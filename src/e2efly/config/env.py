@@ -44,7 +44,7 @@ class DisturbanceConfig:
     its middle vehicle; that of the others is proportional to their arm length."""
     drift: float = number(0.0, high=SPEED)
     """Standard deviation of the observed position's random walk after one second, m per axis."""
-    ceiling: float = number(0.0, high=0.9)
+    ceiling: float = number(0.0, high=0.9, added=True)
     """Largest share of its highest thrust that a rotor does not reach. Each rotor of an episode has its own ceiling.
     Commands below it are not affected."""
 
