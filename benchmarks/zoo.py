@@ -13,7 +13,7 @@ more often than not; none more is made once one meets 99.5 %, or a robust one 97
 is best the runs' own reports say, and of robust ones those rows, from starts of their own; of a family's, unseen
 vehicles in still air. The rows from laws that no training draws from choose nothing. The success that is stated is that
 of the lone ONNX file, of the 1000 starts of `e2efly eval` and `eval --stress`, which nothing was chosen by; in the
-rows, of a policy that sees, of the first 250 of them, and in those rows alone that trainings draw from.
+rows, of the first 250 of them; of a policy that sees, in those rows alone that trainings draw from.
 
 `--again` trains nothing: it flies the robust policies that are there in all rows of the stress, or with `--missing` in
 those that zoo.json does not have, and all at once.
@@ -67,8 +67,8 @@ USUAL_ALONE = (*VARIANTS, "race_clutter_room")
 """For the usual vehicle alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
-SEEN = 250
-"""Starts per row of the stress of a policy that sees, which takes minutes; of the others 1000."""
+PER_ROW = 250
+"""Starts per row of the stress."""
 ENOUGH, ENOUGH_STRESSED, WORTH = 0.995, 0.97, 0.5
 POINTS = 200
 """Evaluations that are kept of a training, for its curve."""
@@ -100,13 +100,13 @@ def stressed(policy: Path, folder: Path, *options: str) -> dict[str, dict[str, f
 
 
 def measured(task: str, known: Collection[str] = ()) -> tuple[str, ...]:
-    """The options of the stress that zoo.json tells: all rows but the known ones. A policy that sees, which takes
-    minutes, has fewer starts, and those rows alone that trainings draw from.
+    """The options of the stress that zoo.json tells: all rows but the known ones. Of a policy that sees, which takes
+    minutes, those rows alone that trainings draw from.
     """
     cameras = TASKS[task].cameras if task in TASKS else ()
     rows = rows_for(cameras) if cameras else every_row(cameras)
     new = [row for row in rows if row not in known or row == ALL]  # all at once has the new ones, too
-    return (*(("--episodes", str(SEEN)) if cameras else ()), "--rows", *new)
+    return ("--episodes", str(PER_ROW), "--rows", *new)
 
 
 def recipe(vehicle: str, task: str) -> tuple[str, str]:
@@ -137,7 +137,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
     more: dict[str, Any] = {"preset": "robust"} if together else {"preset": name} if name else {}
     if name == "robust":
         if chosen:
-            options = ("--episodes", "250", "--seed", str(CHOSEN_BY), "--rows", *rows_for(TASKS[task].cameras))
+            options = ("--episodes", str(PER_ROW), "--seed", str(CHOSEN_BY), "--rows", *rows_for(TASKS[task].cameras))
             rows = stressed(out / "policy.onnx", folder, *options)["stress"]
             at_once = rows.pop(ALL)
             reported = min(rows.values()) + 1e-3 * at_once  # among equals the one that stands all at once more often

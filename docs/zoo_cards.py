@@ -60,8 +60,8 @@ package. Every command that takes a policy takes one by the name of its card:
 - **Success** is that of 1000 unseen starts of `e2efly eval`, with the vehicle of the file in still air; of *any
   quadrotor*, with 1000 random vehicles that the training did not draw. The [tasks](tasks.md) say what counts.
 - **Under stress** the vehicle, the air or the sensors are not those of the file: one difference in each
-  [row](robustness.md#stress), and a last row with all of them at once. Each row is of 1000 starts, and of 250 where
-  the policy sees. A card names the worst rows; [Benchmarks](benchmarks.md) has all of them. *Not in training* are rows
+  [row](robustness.md#stress), and a last row with all of them at once. Each row is of 250 starts.
+  A card names the worst rows; [Benchmarks](benchmarks.md) has all of them. *Not in training* are rows
   from [laws](robustness.md#laws-that-no-training-draws-from) that no training draws from.
 - **Pictures** show the first starts of `e2efly eval`: 12, or 6 where the policy sees. **Videos** show one of
   these flights, from a camera behind the vehicle. The blue ring is around the place where the policy is told to be.
