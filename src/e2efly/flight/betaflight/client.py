@@ -218,8 +218,8 @@ class Client:
         fitting = [k for k, (awaited, _) in enumerate(self._awaited) if awaited == code]
         if not fitting:
             if now - self._spoilt < FORGOTTEN and (late := [entry for entry in self._lost if entry[0] == code]):
-                self._lost.remove(late[0])
-                return late[0][1]
+                self._lost.remove(late[-1])  # the last one: replies to earlier ones were lost indeed
+                return late[-1][1]
             self._foreign = now
             self._steered = now if code == messages.SET_RAW_RC else self._steered
             return now
