@@ -78,22 +78,27 @@ class PlainRateLoop:
 
     def start(self, body_rate: Numbers) -> None:
         """Reset the integrals and settle the filter of the body rates."""
-        self._integral, self._seen = [0.0, 0.0, 0.0], list(body_rate)
+        self._integral, self._seen, self._last = [0.0, 0.0, 0.0], list(body_rate), list(body_rate)
+        self._error: Numbers | None = None
 
     def thrusts(self, command: Numbers, body_rate: Numbers, dt: float) -> list[float]:
         """Thrusts of the rotors, N, for a command of thrust and rates, `dt` s after the last one."""
         if self._filter is not None:
             left = math.exp(-dt / self._filter)
-            self._seen = body_rate = [w + (old - w) * left for old, w in zip(self._seen, body_rate, strict=True)]
+            means = [(before + now) / 2 for before, now in zip(self._last, body_rate, strict=True)]
+            self._last = list(body_rate)
+            self._seen = body_rate = [w + (old - w) * left for old, w in zip(self._seen, means, strict=True)]
         errors = [
             min(max(wanted, -limit), limit) - rate
             for wanted, limit, rate in zip(command[1:], self._limits, body_rate, strict=True)
         ]
         asked = [k * error for k, error in zip(self._gains, errors, strict=True)]
         if self._integral_gains is not None:
+            before, self._error = errors if self._error is None else self._error, errors
+            means = [(a + b) / 2 for a, b in zip(before, errors, strict=True)]
             self._integral = [
                 min(max(now + k * error * dt, -most), most)
-                for now, k, error, most in zip(self._integral, self._integral_gains, errors, self._largest, strict=True)
+                for now, k, error, most in zip(self._integral, self._integral_gains, means, self._largest, strict=True)
             ]
             asked = [a + now for a, now in zip(asked, self._integral, strict=True)]
         return self._mixed(self._mass * command[0], self._torque(asked, body_rate))
