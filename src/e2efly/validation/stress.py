@@ -22,7 +22,6 @@ from e2efly.environment.episodes import Act, Episodes, EpisodesUnderWay, run_ste
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import fast_compile, prepare, wide_vectors
 from e2efly.simulation.physics import RateLoop
-from e2efly.simulation.physics.body import rotor_speed_for
 from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate
 from e2efly.validation.law_step import BODY, LawMemory, LawStep, air_of, arrived, observed
 from e2efly.validation.stress_laws import LATEST, LAWS, LawSetting, StressLaw, steps_of
@@ -212,11 +211,11 @@ def _programs(seeing: bool) -> tuple[Callable, Callable]:
         plant: dict[str, Any] = {**draw.plant, **{name: getattr(now, name) for name in BODY}}
         plant["mass"] = plant["mass"] * now.mass
         plant["rotor_position"] = plant["rotor_position"] - now.shift[:, None]
-        disturbance = dataclasses.replace(draw.disturbance, rotor_share=share)
+        ceiling = jnp.broadcast_to(now.ceiling[:, None], share.shape)
+        disturbance = dataclasses.replace(draw.disturbance, rotor_share=share, ceiling=ceiling)
         latency = draw.latency + now.later
         state = dataclasses.replace(state, plant=plant, wind=wind, disturbance=disturbance, action_latency=latency)
-        flown = dataclasses.replace(env, physics=dataclasses.replace(env.physics, full_speed=_full_speed(env, now)))
-        flight = dataclasses.replace(flight, state=state).after(flown, arrives, settle)
+        flight = dataclasses.replace(flight, state=state).after(env, arrives, settle)
         sent = jnp.concatenate([action[:, None], sent[:, :-1]], axis=1)
         state = flight.state
         seen, felt = observed(then, felt, env.sensed(state), env.control_period)
@@ -229,14 +228,6 @@ def _programs(seeing: bool) -> tuple[Callable, Callable]:
     options = wide_vectors(BATCH) | ({} if seeing else fast_compile())
     first, further = (jax.jit(program, compiler_options=options) for program in (begin, after))
     return first, further
-
-
-def _full_speed(env: Env, law: LawStep) -> Array:
-    """The largest speed of the rotors, (n,) rad/s, for a ceiling of their thrust. Infinite: only the mixer's."""
-    usual = jnp.inf if env.physics.full_speed is None else env.physics.full_speed
-    thrust = env.physics.mixer.thrust_max * law.ceiling
-    lower = rotor_speed_for(env.physics.flown, (thrust, thrust, thrust, thrust))[0]
-    return jnp.where(law.ceiling < 1, jnp.minimum(lower, usual), usual)
 
 
 def laws_of(law: StressLaw, vehicle: Vehicle, seed: int, n: int, steps: int, period: float) -> LawStep:
