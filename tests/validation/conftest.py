@@ -39,9 +39,14 @@ def _own_files_are_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.fixture
 def heavy(tmp_path: Path) -> str:
     """The file of a VIS-R with 20 % more mass."""
-    vehicle, file = vehicle_file("vis_r").read_text(), tmp_path / "heavy.toml"
-    file.write_text(vehicle.replace("value = 0.75\n", "value = 0.9\n", 1))
-    assert load_vehicle(file).mass == 0.9
+    return weighing(0.9, tmp_path)
+
+
+def weighing(mass: float, folder: Path) -> str:
+    """The file of a VIS-R of another mass, kg."""
+    vehicle, file = vehicle_file("vis_r").read_text(), folder / "heavy.toml"
+    file.write_text(vehicle.replace("value = 0.75\n", f"value = {mass}\n", 1))
+    assert load_vehicle(file).mass == mass
     return str(file)
 
 
