@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 
 from e2efly.commands.train import parse
-from tests.conftest import QUICK
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
@@ -69,14 +68,8 @@ def command(*words: str, file: Path, runs: Path) -> list[str]:
     return [sys.executable, str(BENCHMARKS / "paper.py"), *words, "--short", "--json", str(file), "--runs", str(runs)]
 
 
-def environment() -> dict[str, str]:
-    return {**os.environ, "XLA_FLAGS": f"{os.environ.get('XLA_FLAGS', '')} {QUICK}"}
-
-
 def run(*words: str, file: Path, runs: Path) -> str:
-    done = subprocess.run(
-        command(*words, file=file, runs=runs), env=environment(), capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(command(*words, file=file, runs=runs), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -107,9 +100,7 @@ def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, f
 @pytest.mark.whole
 def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "paper.json"
-    with subprocess.Popen(
-        command("learning", file=file, runs=folder), env=environment(), start_new_session=True
-    ) as running:
+    with subprocess.Popen(command("learning", file=file, runs=folder), start_new_session=True) as running:
         while not (file.exists() and json.loads(file.read_text())["learning"]["runs"]):
             assert running.poll() is None
             time.sleep(0.01)
@@ -127,10 +118,7 @@ def test_what_was_killed_goes_on_where_it_was(folder: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.whole
-def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XLA_FLAGS", environment()["XLA_FLAGS"])
+def test_a_training_that_was_stopped_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
     steps = 8_000
     longer = (*SHORT, *SMALL["ppo"], "--steps", str(steps))
     one, out = Run("hover", "ppo", "long", (*NOMINAL, *longer)), tmp_path / "run"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.config import LinkConfig
 from e2efly.environment.draws import sometimes
@@ -33,10 +33,13 @@ class LostCommands:
 
     def after(self, key: PRNGKeyArray, action: Float[Array, "n 4"], time: Float[Array, " n"]) -> "LostCommands":
         """The link when an action is sent, at a time since the start of the episode, s."""
-        lost = jax.random.uniform(key, time.shape) < self.dropped
-        lost |= jnp.mod(time + self.phase, EVERY) < self.silence
-        newest = jnp.where(lost[:, None], self.arrived[:, 0], action)
+        newest = jnp.where(self.loses(key, time)[:, None], self.arrived[:, 0], action)
         return dataclasses.replace(self, arrived=jnp.concatenate([newest[:, None], self.arrived[:, :-1]], axis=1))
+
+    def loses(self, key: PRNGKeyArray, time: Float[Array, " n"]) -> Bool[Array, " n"]:
+        """Whether a command is lost that is sent at a time since the start of the episode, s."""
+        dropped = jax.random.uniform(key, time.shape) < self.dropped
+        return dropped | (jnp.mod(time + self.phase, EVERY) < self.silence)
 
 
 def draw(config: LinkConfig, key: PRNGKeyArray, actions: Float[Array, "n k 4"]) -> LostCommands:

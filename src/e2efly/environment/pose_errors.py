@@ -75,7 +75,6 @@ class PoseErrors:
         A low-pass is of first order and exact for a state that stays as it is for `dt`. Each pose draws how often it
         is repeated.
         """
-        chance = jax.random.uniform(key, (2, *self.hold.shape))
         row = _packed(seen)
         # of the two quaternions of an attitude the one that is nearer to the last
         opposite = jnp.sum(self.smooth * row * ATTITUDE, axis=-1) < 0
@@ -83,11 +82,15 @@ class PoseErrors:
         kept = jnp.repeat(jnp.exp(-dt / jnp.maximum(self.lag, 1e-6)), SIZES, axis=-1, total_repeat_length=13)
         smooth = row + kept * (self.smooth - row)
         held = (self.left > 0)[:, None] & POSE
+        told = jnp.where(held, self.told, smooth)
+        return dataclasses.replace(self.counted(key, dt), smooth=smooth, told=told)
+
+    def counted(self, key: PRNGKeyArray, dt: float) -> "PoseErrors":
+        """The estimator `dt` s later, in what does not depend on the state: `left` and `wrong`."""
+        chance = jax.random.uniform(key, (2, *self.hold.shape))
         turns = chance[1] < dt / jnp.where(self.wrong > 0, JUMP, BETWEEN_JUMPS)
         return dataclasses.replace(
             self,
-            smooth=smooth,
-            told=jnp.where(held, self.told, smooth),
             left=jnp.where(self.left > 0, self.left - 1, jnp.floor((self.hold + 1) * chance[0])),
             wrong=jnp.where(turns, 1 - self.wrong, self.wrong),
         )

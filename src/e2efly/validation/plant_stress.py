@@ -12,10 +12,11 @@ import numpy as np
 
 from e2efly.config.budget import check_memory
 from e2efly.environment import UNSEEN, disturbance, random_key
-from e2efly.environment.lost_commands import EVERY
-from e2efly.environment.pose_errors import BETWEEN_JUMPS, JUMP
+from e2efly.environment.lost_commands import LostCommands
+from e2efly.environment.pose_errors import PoseErrors
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen
 from e2efly.simulation.device import compute_at_once, prepare
+from e2efly.simulation.physics import State
 from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.law_step import BODY, LawStep
@@ -142,22 +143,18 @@ def told_law(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: float
 
     What happens when is another random sequence than that of the training simulator.
     """
-    e, link, n = drawn.estimate, drawn.link, len(drawn.latency)
-    if not any(np.any(x) for x in (*e.values(), link["dropped"], link["silence"])):
+    told, lost, n = drawn.estimate, drawn.link, len(drawn.latency)
+    if not any(np.any(x) for x in (*told.values(), lost["dropped"], lost["silence"])):
         return None
-    rng, time = np.random.default_rng([seed, UNSEEN, n, 1]), period * np.arange(steps)[:, None]
+    place = jnp.zeros((n, 3))
+    errors = PoseErrors.of(**told, seen=State(place, place, jnp.zeros((n, 4)), place, jnp.zeros((n, 4))))
+    link, key = LostCommands(**lost, arrived=jnp.zeros((n, 1, 4))), random_key(seed, UNSEEN, 1)
+    held, wrong, lacks = (np.asarray(x, np.float64) for x in _told(errors, link, key, steps, period))
     error = np.zeros((steps, n, 12))
-    error[..., 6:8] = e["turned"][:, 1:] / 2
-    held, wrong, left, off = np.zeros((steps, n)), np.zeros((steps, n)), np.zeros(n), np.zeros(n, bool)
-    for k in range(steps):
-        held[k], wrong[k] = left > 0, off
-        left = np.where(left > 0, left - 1, np.floor((e["hold"] + 1) * rng.uniform(size=n)))
-        off ^= rng.uniform(size=n) < period / np.where(off, JUMP, BETWEEN_JUMPS)
-    error[..., 0:3] = wrong[..., None] * e["jump"]
-    lost = (rng.uniform(size=(steps, n)) < link["dropped"]) | ((time + link["phase"]) % EVERY < link["silence"])
-    still = steps_of(None, LawSetting(vehicle, rng, n, steps, period))
-    lag, heading = (np.broadcast_to(x, (steps, *x.shape)) for x in (e["lag"], e["turned"][:, 0]))
-    return dataclasses.replace(still, lag=lag, error=error, heading=heading, held=held, lost=1.0 * lost)
+    error[..., 0:3], error[..., 6:8] = wrong[..., None] * told["jump"], told["turned"][:, 1:] / 2
+    still = steps_of(None, LawSetting(vehicle, np.random.default_rng(0), n, steps, period))
+    lag, heading = (np.broadcast_to(x, (steps, *x.shape)) for x in (told["lag"], told["turned"][:, 0]))
+    return dataclasses.replace(still, lag=lag, error=error, heading=heading, held=held, lost=lacks)
 
 
 def under_law(
@@ -186,3 +183,17 @@ def _tracks(d: disturbance.Disturbance, key: jax.Array, steps: int, period: floa
         return disturbance.advance(d, jax.random.fold_in(key, k), period), now
 
     return jax.lax.scan(step, jax.tree.map(jnp.asarray, d), jnp.arange(steps))[1]
+
+
+@partial(jax.jit, static_argnums=3)
+def _told(
+    errors: PoseErrors, link: LostCommands, key: jax.Array, steps: int, period: float
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Whether a pose is repeated, whether it jumps, and whether the command is lost: (t, n), in each control step."""
+
+    def step(errors: PoseErrors, k: jax.Array) -> tuple[PoseErrors, tuple[jax.Array, jax.Array, jax.Array]]:
+        pose, command = jax.random.split(jax.random.fold_in(key, k))
+        time = jnp.full(errors.hold.shape, k * period)
+        return errors.counted(pose, period), (errors.left > 0, errors.wrong, link.loses(command, time))
+
+    return jax.lax.scan(step, errors, jnp.arange(steps))[1]
