@@ -12,6 +12,9 @@ from e2efly.config import (
     AlgorithmConfig,
     DisturbanceConfig,
     EnvConfig,
+    EstimateConfig,
+    LinkConfig,
+    NoiseConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
@@ -41,10 +44,16 @@ OTHERS = EnvConfig(
         "mass": 0.25, "inertia": 0.5, "motor_time_constant": 0.8, "drag_linear": 0.9, "drag_quadratic": 0.9,
         "torque_ratio": 0.3, "rate_gain": 0.5,
     },
-    wind=3.0,
-    disturbance=DisturbanceConfig(gust=1.0, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006),
+    wind=5.0,
+    disturbance=DisturbanceConfig(gust=1.5, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006, ceiling=0.1),
+    estimate=EstimateConfig(
+        position_lag=0.04, velocity_lag=0.08, attitude_lag=0.03, body_rate_lag=0.02, yaw=0.09, tilt=0.035, jump=0.1,
+        hold=4.0,
+    ),
+    link=LinkConfig(dropped=0.1, silence=0.2),
+    noise=NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02),
 )  # fmt: skip
-"""The vehicles of the preset `robust`."""
+"""The vehicles of the preset `robust`, the air, the state estimate and the link."""
 AROUND = EnvConfig(
     randomize={posterior.IDENTIFIED: 1.0},
     wind=2.0,
@@ -248,7 +257,9 @@ def _narrower(share: float) -> EnvConfig:
     return dataclasses.replace(
         OTHERS,
         randomize={**OTHERS.randomize, "mass": share * OTHERS.randomize["mass"]},
-        disturbance=dataclasses.replace(d, thrust=share * d.thrust, rotor=share * d.rotor, sag=share * d.sag),
+        disturbance=dataclasses.replace(
+            d, **{name: share * getattr(d, name) for name in ("thrust", "rotor", "sag", "ceiling")}
+        ),
     )
 
 

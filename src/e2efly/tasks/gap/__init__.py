@@ -19,7 +19,11 @@ class GapConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.gap.goal:GapGoal"
     route: ClassVar[str] = "e2efly.tasks.gap.goal:GapRoute"
     best: ClassVar = "bptt"
-    robust: ClassVar = {"bptt": Robust(steps=8_000_000, chunk=60, recurrent=96, hidden=(96, 96))}
+    robust: ClassVar = {
+        "bptt": Robust(
+            algo={"average": 0.99}, steps=10_000_000, chunk=60, recurrent=96, hidden=(96, 96), eased=(0.4, 4_000_000)
+        )
+    }
 
     episode_s: float = 6.0
     """Length of an episode, s."""

@@ -24,8 +24,8 @@ class HoverAwareConfig(TaskConfig):
     robust: ClassVar = {
         "bptt": Robust(
             weights={"prog2": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
-            algo={"horizon": 96, "learning_rate": 8e-3},
-            steps=3_000_000,
+            algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
+            steps=3_900_000,
         ),
     }
 

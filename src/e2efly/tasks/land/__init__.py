@@ -65,13 +65,11 @@ class LandConfig(TaskConfig):
     robust: ClassVar = {
         "bptt": Robust(
             weights={"progxy": 1.0, "descent": 1.0, "upright": 0.1, "anglev_sq": 0.05, "act2_sq": 0.05},
-            algo={"horizon": 96},
-            steps=2_200_000,
+            algo={"horizon": 96, "average": 0.99},
+            steps=2_900_000,
         )
     }
-    family: ClassVar = {
-        "bptt": replace(robust["bptt"], algo={"horizon": 96, "average": 0.99}, steps=6_000_000, chunk=60)
-    }
+    family: ClassVar = {"bptt": replace(robust["bptt"], steps=6_000_000, chunk=60)}
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
         millions=(100, 10),

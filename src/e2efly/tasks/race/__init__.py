@@ -51,11 +51,14 @@ class RaceConfig(TaskConfig):
     best: ClassVar = "bptt"
     robust: ClassVar = {
         "bptt": Robust(
-            weights={"prog1": 1.0, "near": 0.2, "anglev_sq": 0.001, "act2_sq": 0.01},
-            steps=8_000_000,
+            weights={"progway": 1.0, "fitlog": 2.0, "anglev_sq": 0.001, "act2_sq": 0.01},
+            parameters={"fitlog_margin": 0.1},
+            algo={"learning_rate": 4e-3, "learning_rate_end": 1e-4, "gradient_decay": 0.3, "average": 0.99},
+            steps=10_000_000,
             chunk=50,
             recurrent=96,
             hidden=(96, 96),
+            eased=(0.4, 4_000_000),
         )
     }
     family: ClassVar = {

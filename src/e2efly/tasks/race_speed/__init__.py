@@ -32,7 +32,11 @@ class RaceSpeedConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedGoal"
     route: ClassVar[str] = "e2efly.tasks.race_speed.goal:RaceSpeedRoute"
     best: ClassVar = "bptt"
-    robust: ClassVar = {"bptt": Robust(steps=5_000_000, chunk=100, recurrent=96, hidden=(96, 96))}
+    robust: ClassVar = {
+        "bptt": Robust(
+            algo={"average": 0.99}, steps=6_500_000, chunk=100, recurrent=96, hidden=(96, 96), eased=(0.4, 2_500_000)
+        )
+    }
     family: ClassVar = {
         "bptt": Robust(
             weights={"vel": 1.0, "progway": 2.5, "fitlog": 40.0, "anglev_sq": 0.001, "act2_sq": 0.01},

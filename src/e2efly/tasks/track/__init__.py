@@ -43,8 +43,8 @@ class TrackConfig(TaskConfig):
     robust: ClassVar = {
         "bptt": Robust(
             weights={"prog2": 1.0, "anglev_sq": 0.02, "act2_sq": 0.03},
-            algo={"horizon": 96},
-            steps=3_000_000,
+            algo={"horizon": 96, "average": 0.99},
+            steps=3_600_000,
         ),
         "ppo": Robust(algo={"horizon": 64, "learning_rate": 2e-3, "gamma": 0.96}, steps=6_000_000, recurrent=96),
     }
