@@ -118,7 +118,8 @@ def network(network_library: Path | None, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--whole", action="store_true", help="all tests, also those of `make test-all` alone")
+    parser.addoption("--whole", action="store_true", help="all tests, also those that `make test` leaves out")
+    parser.addoption("--rest", action="store_true", help="the tests that `make test` leaves out, alone")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -130,11 +131,17 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     here = Path(__file__).parent
     named = any((config.rootpath / argument).resolve() != here for argument in config.args)  # and these are run
-    later = [] if named or config.getoption("--whole") else _of_the_whole(items)
-    folders = [{item.path.parent for item in items if item not in of} for of in (set(), set(later))]
-    if alone := folders[0] - folders[1]:
-        raise pytest.UsageError(f"every test is `whole` in {', '.join(map(str, alone))}; accepted: one that is not")
-    out = {item for item in items if item.path.stem.endswith(tuple(f"_{part}" for part in WITHOUT))} | set(later)
+    whole = set(_of_the_whole(items))
+    if config.getoption("--rest"):
+        left_out = set(items) - whole
+    elif named or config.getoption("--whole"):
+        left_out = set()
+    else:
+        left_out = whole
+        folders = [{item.path.parent for item in items if item not in of} for of in (set(), whole)]
+        if alone := folders[0] - folders[1]:
+            raise pytest.UsageError(f"every test is `whole` in {', '.join(map(str, alone))}; accepted: one that is not")
+    out = left_out | {item for item in items if item.path.stem.endswith(tuple(f"_{part}" for part in WITHOUT))}
     if out:
         config.hook.pytest_deselected(items=[*out])
         items[:] = [item for item in items if item not in out]
