@@ -196,7 +196,7 @@ fewer than 200 motor outputs a second gives thrust, lag and drag, but no inertia
 Five seeds, 1000 starts per row. While the last two seeds of track and the first three of race trained,
 other programs ran on the same two cores: these seeds took up to twice the time of the others.""",
     "zoo_stress": """
-Percent of 1000 unseen starts that succeed, by the worst criterion, in the training simulator. The rows
+Percent of 250 unseen starts that succeed, by the worst criterion, in the training simulator. The rows
 are explained in [robustness](robustness.md#stress). "preset nominal" has no memory and was trained on the
 nominal vehicle (seed 0).""",
     "zoo_stress_gap_hover_aware": """

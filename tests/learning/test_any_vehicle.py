@@ -121,6 +121,13 @@ def test_a_family_sees_by_the_cameras_of_one_vehicle() -> None:
     assert presets.starting("land_visual", "bptt", "robust", "any").env.vehicle == "any"
 
 
+def test_a_family_is_learned_by_the_stages_of_the_task_alone() -> None:
+    for task in [task for task, known in TASKS.items() if known.family]:
+        nominal, many = presets.preset(task, "bptt"), presets.starting(task, "bptt", "robust", "any")
+        assert many.curriculum == nominal.curriculum, task
+    assert presets.starting("race", "bptt", "robust").curriculum != presets.preset("race", "bptt").curriculum
+
+
 def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:
     config = parse(["hover", "--vehicle", "any"]).config
     env = Env.of(config.task, config.reward, config.env)

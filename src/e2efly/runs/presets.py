@@ -14,7 +14,6 @@ from e2efly.config import (
     EnvConfig,
     EstimateConfig,
     LinkConfig,
-    NoiseConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
@@ -51,9 +50,16 @@ OTHERS = EnvConfig(
         hold=4.0,
     ),
     link=LinkConfig(dropped=0.1, silence=0.2),
-    noise=NoiseConfig(position=0.02, velocity=0.1, attitude=0.01, body_rate=0.02),
 )  # fmt: skip
 """The vehicles of the preset `robust`, the air, the state estimate and the link."""
+BY_SIGHT = dataclasses.replace(
+    OTHERS,
+    wind=3.0,
+    disturbance=dataclasses.replace(OTHERS.disturbance, gust=1.0, ceiling=0.0),
+    estimate=EstimateConfig(),
+    link=LinkConfig(),
+)
+"""The same for policies that see: with exact poses, as the policies of the zoo have learned."""
 AROUND = EnvConfig(
     randomize={posterior.IDENTIFIED: 1.0},
     wind=2.0,
@@ -200,7 +206,7 @@ def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainCo
         dataclasses.replace(c, latency=(c.latency[0], c.latency[1] + OLDER), **BESIDE_CAMERA)
         for c in config.env.cameras
     )
-    env = OTHERS if name == ROBUST else AROUND
+    env = AROUND if name == IDENTIFIED else BY_SIGHT if cameras else OTHERS
     return given.into(dataclasses.replace(config, env=dataclasses.replace(env, cameras=cameras)))
 
 
@@ -221,7 +227,7 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
         ValueError: for a vehicle that does not exist.
     """
     env = dataclasses.replace(config.env, vehicle=vehicle)
-    robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
+    robust = any((env.randomize, env.disturbance) == (of.randomize, of.disturbance) for of in (OTHERS, BY_SIGHT))
     if robust and load_family(vehicle) is not None:
         given = config.task.family.get(config.algo.name)
         if given is None:
@@ -230,14 +236,15 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
                 f"{config.task.name} by {config.algo.name}"
             )
         env = dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle, cameras=env.cameras)
-        return given.into(dataclasses.replace(config, env=env))
+        own = config.task.robust[config.algo.name]  # of whose first stage a family's recipe knows nothing
+        stages = config.curriculum if own.eased is None else config.curriculum[1:]
+        return given.into(dataclasses.replace(config, env=env, curriculum=stages))
     if robust:
         known = load_vehicle(vehicle)
-        shares = (_narrower(percent / 100) for percent in range(100, -1, -1))
-        drawn = next(drawn for drawn in shares if known.thrust_to_weight * drawn.weakest >= 1)
-        off = min(drawn.disturbance.centre_of_mass, _held(known, drawn.randomize["rate_gain"]))
-        disturbance = dataclasses.replace(drawn.disturbance, centre_of_mass=off)
-        env = dataclasses.replace(env, randomize=drawn.randomize, disturbance=disturbance)
+        shares = (_narrower(env, percent / 100) for percent in range(100, -1, -1))
+        env = next(drawn for drawn in shares if known.thrust_to_weight * drawn.weakest >= 1)
+        off = min(env.disturbance.centre_of_mass, _held(known, env.randomize["rate_gain"]))
+        env = dataclasses.replace(env, disturbance=dataclasses.replace(env.disturbance, centre_of_mass=off))
     return dataclasses.replace(config, env=env)
 
 
@@ -252,11 +259,11 @@ def _held(vehicle: Vehicle, spread: float) -> float:
     return float(most[:2].min())
 
 
-def _narrower(share: float) -> EnvConfig:
-    d = OTHERS.disturbance
+def _narrower(env: EnvConfig, share: float) -> EnvConfig:
+    d = env.disturbance
     return dataclasses.replace(
-        OTHERS,
-        randomize={**OTHERS.randomize, "mass": share * OTHERS.randomize["mass"]},
+        env,
+        randomize={**env.randomize, "mass": share * env.randomize["mass"]},
         disturbance=dataclasses.replace(
             d, **{name: share * getattr(d, name) for name in ("thrust", "rotor", "sag", "ceiling")}
         ),

@@ -42,14 +42,19 @@ class HoverConfig(TaskConfig):
     best: ClassVar = "bptt"
     robust: ClassVar = {
         "bptt": Robust(
-            weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            weights={"prog2": 1.0, "near": 1.5, "v1": 0.1, "anglev_sq": 0.025, "act2_sq": 0.05},
             algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
             steps=2_900_000,
         ),
         "ppo": Robust(steps=6_000_000, recurrent=96),
     }
     family: ClassVar = {
-        "bptt": dataclasses.replace(robust["bptt"], steps=14_000_000, chunk=60),
+        "bptt": dataclasses.replace(
+            robust["bptt"],
+            weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
+            steps=14_000_000,
+            chunk=60,
+        ),
     }
     rotors: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05},
