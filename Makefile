@@ -27,7 +27,7 @@ REAL_TIME := tests/validation/test_process_faults_sitl.py tests/validation/test_
 
 PYTEST := $(BIN)/python -m pytest -n 2 --max-worker-restart 0 --durations 25 --no-loadscope-reorder $(REAL_TIME:%=--ignore=%)
 
-# What each of the two covers: docs/architecture.md. After `make test`, SUITE=--rest runs no test twice.
+# What each of the two covers: docs/architecture.md. After `make test`, SUITE=--rest runs what that left out.
 SUITE ?= --whole
 test: $(TEST_READY)
 	@$(FIRMWARE) & $(MAKE) --no-print-directory lint && wait

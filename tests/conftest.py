@@ -119,7 +119,7 @@ def network(network_library: Path | None, tmp_path: Path, monkeypatch: pytest.Mo
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--whole", action="store_true", help="all tests, also those that `make test` leaves out")
-    parser.addoption("--rest", action="store_true", help="the tests that `make test` leaves out, alone")
+    parser.addoption("--rest", action="store_true", help="the tests of which `make test` leaves cases out, alone")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -133,7 +133,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     named = any((config.rootpath / argument).resolve() != here for argument in config.args)  # and these are run
     whole = set(_of_the_whole(items))
     if config.getoption("--rest"):
-        left_out = set(items) - whole
+        left_out = {item for item in items if item.get_closest_marker("whole") is None}  # cases may build on the first
     elif named or config.getoption("--whole"):
         left_out = set()
     else:

@@ -38,8 +38,8 @@ class LostCommands:
 
     def loses(self, key: PRNGKeyArray, time: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Whether a command is lost that is sent at a time since the start of the episode, s."""
-        dropped = jax.random.uniform(key, time.shape) < self.dropped
-        return dropped | (jnp.mod(time + self.phase, EVERY) < self.silence)
+        dropped = jax.random.uniform(key, time.shape) < jnp.asarray(self.dropped)
+        return dropped | (jnp.mod(time + self.phase, EVERY) < jnp.asarray(self.silence))
 
 
 def draw(config: LinkConfig, key: PRNGKeyArray, actions: Float[Array, "n k 4"]) -> LostCommands:

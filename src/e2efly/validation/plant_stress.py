@@ -186,12 +186,10 @@ def _tracks(d: disturbance.Disturbance, key: jax.Array, steps: int, period: floa
 
 
 @partial(jax.jit, static_argnums=3)
-def _told(
-    errors: PoseErrors, link: LostCommands, key: jax.Array, steps: int, period: float
-) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _told(errors: PoseErrors, link: LostCommands, key: jax.Array, steps: int, period: float) -> tuple[jax.Array, ...]:
     """Whether a pose is repeated, whether it jumps, and whether the command is lost: (t, n), in each control step."""
 
-    def step(errors: PoseErrors, k: jax.Array) -> tuple[PoseErrors, tuple[jax.Array, jax.Array, jax.Array]]:
+    def step(errors: PoseErrors, k: jax.Array) -> tuple[PoseErrors, tuple[Any, ...]]:
         pose, command = jax.random.split(jax.random.fold_in(key, k))
         time = jnp.full(errors.hold.shape, k * period)
         return errors.counted(pose, period), (errors.left > 0, errors.wrong, link.loses(command, time))
