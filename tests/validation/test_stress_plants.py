@@ -94,7 +94,7 @@ def test_the_command_reports_names_what_is_left_out_and_judges(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report = tmp_path / "report.json"
-    asked = ["validate", "hover", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "1", "--out"]
+    asked = ["validate", "land", "--stress", "--plant", f"{EXAMPLE}:PointMass", "--episodes", "1", "--out"]
     assert run([*asked, str(tmp_path), "--json", str(report), "--least", "0.5"]) == 0
     said = json.loads(report.read_text())
     assert set(said["stress"]) | set(said["untrained"]) | set(said["left_out"]) == {*BLIND, *LAWS}
