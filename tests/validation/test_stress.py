@@ -164,7 +164,7 @@ def test_the_command_reports_and_judges(tmp_path: Path, capsys: pytest.CaptureFi
     assert rows["nominal"]["hover"]["episodes"] == 20
     assert (plots / "stress.png").stat().st_size > 10_000
     assert "delay +20 ms" in capsys.readouterr().out
-    asked = ["eval", "hover_aware", "--vehicle", "crazyflie", "--stress", "--rows", "wind 3 m/s", "--episodes", "20"]
+    asked = ["eval", "hover_aware", "--vehicle", "crazyflie", "--stress", "--rows", "gusts 1.5 m/s", "--episodes", "20"]
     asked += ["--plots", str(plots)]
     assert run([*asked, "--least", "1.0"]) == 1
     assert "100.0% is asked for" in capsys.readouterr().out
