@@ -34,7 +34,8 @@ def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
             assert steady(other) == own
             assert (other.latency, other.angle_spread, other.fov_spread) == ((0.0, 0.05), 0.06, 0.04)
         assert robust.task == nominal.task
-        assert robust.reward.weights.keys() >= {"anglev_sq", "act2_sq"} & nominal.reward.weights.keys()
+        replaced = {"prog1", "near"} if task == "race" else set()  # by progress along the way, and the gates' middle
+        assert robust.reward.weights.keys() >= nominal.reward.weights.keys() - replaced
     nominal, robust = (e2efly.preset("hover", "ppo", name) for name in ("nominal", "robust"))
     assert (robust.env, robust.reward) == (presets.OTHERS, nominal.reward)
 
@@ -130,4 +131,5 @@ def test_the_centre_of_mass_is_drawn_no_farther_off_than_the_rate_loop_can_hold(
         turn = offset * 4 * vehicle.thrust_range[1] / (vehicle.inertia * 0.5 * vehicle.rate_gain)
         assert offset == pytest.approx(drawn, rel=0.01)
         assert np.all(turn[:2] <= vehicle.body_rate_max[:2] * (1 + 1e-9))
-        assert env.randomize | {"mass": 0} == presets.OTHERS.randomize | {"mass": 0}  # the weak draw less of that
+        mass = 0.2325 if name == "crazyflie" else presets.OTHERS.randomize["mass"]  # the weaker one draws less of it
+        assert env.randomize == presets.OTHERS.randomize | {"mass": mass}

@@ -236,9 +236,7 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
                 f"{config.task.name} by {config.algo.name}"
             )
         env = dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle, cameras=env.cameras)
-        own = config.task.robust[config.algo.name]  # of whose first stage a family's recipe knows nothing
-        stages = config.curriculum if own.eased is None else config.curriculum[1:]
-        return given.into(dataclasses.replace(config, env=env, curriculum=stages))
+        return given.into(dataclasses.replace(_nominal(type(config.task), type(config.algo)), env=env))
     if robust:
         known = load_vehicle(vehicle)
         shares = (_narrower(env, percent / 100) for percent in range(100, -1, -1))
