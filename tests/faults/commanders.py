@@ -28,6 +28,8 @@ class Field:
     def __init__(self, rig: Rig, link: Loopback, log: Log | None = None) -> None:
         self.rig, self.link = rig, link
         self.session = Session(rig, rehearsal_settings(HEIGHT), commands=link, log=log)
+        self.flown: set[str] = set()
+        """The modes by whose commands the vehicle has flown."""
 
     @property
     def mode(self) -> Mode:
@@ -64,8 +66,11 @@ class Field:
         """A message before each control step; without `mode` policy it ends."""
         began = self.rig.now()
         while self.rig.now() - began < seconds:
-            self.link.send(encode(**{"stamp": self.rig.now(), **stamped}, **commands(self.rig.now() - began)))
+            message = commands(self.rig.now() - began)
+            self.link.send(encode(**{"stamp": self.rig.now(), **stamped}, **message))
             self.session.step()
+            if self.mode is Mode.POLICY:
+                self.flown.add(message["mode"])
 
     def strike(self, fault: str) -> float:
         """Let a commander that flies break; how long the flight goes on by commands, s, at most 1 s."""
