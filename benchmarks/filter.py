@@ -24,7 +24,7 @@ from filter_firmware import through_firmware
 from filter_flights import KINDS, Seen, adversaries, drawn_fences, fly, swapped
 
 from e2efly.control import Quat
-from e2efly.flight.filter.filter import Filter, FilterMemory, filtered, remember, stopping_distance, watch
+from e2efly.flight.filter.filter import Filter, FilterMemory, compiled, filtered, remember, stopping_distance, watch
 from e2efly.flight.filter.forecast import ForecastCommand
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.pilot.hover import controlled, rates_of
@@ -146,8 +146,13 @@ def judged(filter: Filter, flight: Any, mode: str, lands: bool) -> int:
 
 def timed(calls: int = 20000) -> list[dict[str, Any]]:
     """Part 3: seconds of the processor for a call of `watch`, `filtered` and `remember`."""
-    vehicle = load_vehicle(VEHICLE)
-    filter = Filter.of(vehicle, Fence((-5.0, -5.0, 0.2), (5.0, 5.0, 6.0), speed=6.0), LATENCY)
+    filter = Filter.of(load_vehicle(VEHICLE), Fence((-5.0, -5.0, 0.2), (5.0, 5.0, 6.0), speed=6.0), LATENCY)
+    formulas = {"compiled": compiled(filter), "in Python": filter}
+    return [{"formulas": name, **row} for name, of in formulas.items() for row in timed_calls(of, calls)]
+
+
+def timed_calls(filter: Filter, calls: int) -> list[dict[str, Any]]:
+    """The same for a filter."""
     random, memory = np.random.default_rng(0), FilterMemory()
     for k in range(-20, 0):
         memory = remember(memory, ForecastCommand(GRAVITY, 0.0, 0.0, 0.0), k * 0.01)

@@ -39,6 +39,7 @@ FENCE = Fence(low=(-6.0, -6.0, 0.2), high=(6.0, 6.0, 6.0), speed=6.0, tilt=1.4)
 FILTER = Filter.of(VEHICLE, FENCE)
 HOVER = ForecastCommand(GRAVITY, 0.0, 0.0, 0.0)
 DT = 0.01
+STEP = FILTER.backup.response.step(DT)
 
 
 def pitched(tilt: float) -> tuple[float, float, float, float]:
@@ -87,7 +88,7 @@ def fly(
         given = filtered(filter, memory, seen, now, level).command
         memory = remember(memory, given, now)
         pipe.append(given)
-        flown.append(moved(SCALARS, filter.backup.response, body, pipe.pop(0), NOTHING, DT))
+        flown.append(moved(SCALARS, filter.backup.response, body, pipe.pop(0), NOTHING, STEP))
     return flown
 
 
@@ -130,7 +131,7 @@ def test_one_command_for_ever_breaches_nothing_and_names_what_it_was_changed_for
         limits += [keeper.change.limit] if keeper.change else []
         keeper.sent(given, now)
         pipe.append(ForecastCommand(given.thrust, given.rate.x, given.rate.y, given.rate.z))
-        flown.append(moved(SCALARS, FILTER.backup.response, flown[-1], pipe.pop(0), NOTHING, DT))
+        flown.append(moved(SCALARS, FILTER.backup.response, flown[-1], pipe.pop(0), NOTHING, STEP))
     assert limit in limits
     for m in flown:
         assert all(low < at < high for low, at, high in zip(FENCE.low, (m.px, m.py, m.pz), FENCE.high, strict=True))
@@ -281,7 +282,7 @@ def test_a_loss_of_thrust_is_noticed_and_made_up_for() -> None:
         now = k * DT
         memory = watch(FILTER, memory, odometry(m, now), now, flying=True)
         memory = remember(memory, HOVER, now)
-        m = moved(SCALARS, FILTER.backup.response, m, HOVER, NOTHING._replace(share=0.8), DT)
+        m = moved(SCALARS, FILTER.backup.response, m, HOVER, NOTHING._replace(share=0.8), STEP)
     assert memory.air.share == pytest.approx(0.8, abs=0.02)
     assert memory.air.x == pytest.approx(0.0, abs=0.01)
     lost, full = memory.air, NOTHING

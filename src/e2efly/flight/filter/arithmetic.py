@@ -20,7 +20,6 @@ class Scalars:
     sin = staticmethod(math.sin)
     cos = staticmethod(math.cos)
     arctan2 = staticmethod(math.atan2)
-    isfinite = staticmethod(math.isfinite)
 
     @staticmethod
     def maximum(a: float, b: float) -> float:

@@ -8,24 +8,35 @@ and Chen et al., Backup control barrier functions, 2021). The manoeuvre's path i
 
 import itertools
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any
 
 from e2efly.flight.filter.arithmetic import SCALARS, Number, clip
-from e2efly.flight.filter.backup import TIMING, Backup, axes_z, brake, command
+from e2efly.flight.filter.backup import TIMING, Backup, axes_z
 from e2efly.flight.filter.backup_path import stopping
-from e2efly.flight.filter.forecast import NOTHING, Actuators, ForecastCommand, ForecastMotion, Residual, actuated, moved
-from e2efly.flight.filter.margins import NAMES, MarginLimits, against, near, retreat, rooms
+from e2efly.flight.filter.forecast import (
+    NOTHING,
+    Actuators,
+    ForecastCommand,
+    ForecastMotion,
+    GyroReading,
+    Residual,
+    Response,
+    Stretch,
+    actuated,
+    advanced,
+)
+from e2efly.flight.filter.judgement import judged
+from e2efly.flight.filter.margins import NAMES, MarginLimits, near, rooms
+from e2efly.flight.filter.native import SOLIDS, Native
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
-HOLD = 0.01
-"""A command is judged as if it were held for this time, s."""
-HALVINGS = 3
-"""How many times the share of the change is halved: down to an eighth."""
 AIR_S, AIR_MOST = 0.4, 4.0
 """The acceleration that the forecast does not explain is averaged over the first value, s, and is at most the second
 value per axis, m/s^2."""
@@ -50,6 +61,8 @@ class Filter:
     limits: MarginLimits
     latency: float
     """The time from the vehicle's motion to its rate loop, s."""
+    native: Native | None = field(default=None, compare=False)
+    """The formulas as machine code, for floats. None: Python computes them."""
 
     @staticmethod
     def of(vehicle: Vehicle, fence: Fence, latency: float | None = None) -> "Filter":
@@ -63,6 +76,15 @@ class Filter:
         filter = Filter(backup, limits, float(vehicle.latency if latency is None else latency))
         _check(filter, fence)
         return filter
+
+
+def compiled(filter: Filter) -> Filter:
+    """The same filter with its formulas as machine code.
+
+    Raises:
+        OSError: without a C compiler, or if it fails.
+    """
+    return replace(filter, native=Native(filter.backup, filter.limits))
 
 
 def stopping_distance(filter: Filter, speed: float) -> float:
@@ -177,8 +199,9 @@ def watch(filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, 
         zero = 0.0 * velocity[0]
         before = Actuators(zero, zero, zero, zero, zero, zero + GRAVITY)
     after = before
-    for c, h in _between(memory.sent, memory.since - filter.latency, now - filter.latency):
-        after = actuated(xp, filter.backup.response, after, c, h)
+    r = filter.backup.response
+    for command, step, _ in _between(r, memory.sent, memory.since - filter.latency, now - filter.latency):
+        after = actuated(xp, r, after, command, step)
     air = memory.air
     dt = odometry.time - memory.stamp
     if not flying:
@@ -226,24 +249,34 @@ def forecast(filter: Filter, memory: FilterMemory, odometry: Odometry, now: floa
     a = memory.actuators
     ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
     m = ForecastMotion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
-    begin, before = memory.since - filter.latency, None
-    felt = [one for one in memory.felt if begin < one[0] <= now]
-    for at, rate in (*felt, (now, None)):
-        for c, h in _between(memory.sent, begin, at):
-            m = moved(xp, filter.backup.response, m, c, memory.air, h)
-        if rate is not None:
-            m, begin, before = _turning(m, rate, at, before), at, (at, rate)
+    stretches = _stretches(filter, memory, now)
+    if filter.native is not None and xp is SCALARS:
+        return filter.native.forecast(m, memory.air, stretches)
+    for stretch in stretches:
+        m = advanced(xp, filter.backup.response, m, memory.air, stretch)
     return m
 
 
-def _turning(
-    m: ForecastMotion, rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None
-) -> ForecastMotion:
-    """The state with the measured body rate, and with the angular acceleration since the previous gyro reading."""
-    ax, ay = m.ax, m.ay
-    if before is not None and 0.0 < at - before[0] < FELT_S:
-        ax, ay = ((rate[i] - before[1][i]) / (at - before[0]) for i in range(2))
-    return m._replace(wx=rate[0], wy=rate[1], wz=rate[2], ax=ax, ay=ay)
+def _stretches(filter: Filter, memory: FilterMemory, now: float) -> list[Stretch]:
+    """What acts from the odometry until a command of now begins to: the commands on their way, and the gyro's readings,
+    each at the end of a stretch. A reading in a time of no length follows that of the stretch before it.
+    """
+    r, begin, before, found = filter.backup.response, memory.since - filter.latency, None, list[Stretch]()
+    for at, rate in memory.felt:
+        if begin < at <= now:
+            found += _between(r, memory.sent, begin, at)
+            if found:
+                found[-1] = found[-1]._replace(reading=_reading(rate, at, before))
+            begin, before = at, (at, rate)
+    return found + _between(r, memory.sent, begin, now)
+
+
+def _reading(rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> GyroReading:
+    """A gyro reading, with the angular acceleration since the previous one."""
+    if before is None or not 0.0 < at - before[0] < FELT_S:
+        return GyroReading(*rate, 0.0, 0.0, 0.0)
+    ax, ay = ((rate[i] - before[1][i]) / (at - before[0]) for i in range(2))
+    return GyroReading(*rate, 1.0, ax, ay)
 
 
 def filtered(
@@ -254,68 +287,28 @@ def filtered(
     counts.
     """
     xp = _apart(odometry.position)[0]
-    b, r, air = filter.backup, filter.backup.response, memory.air
     m = forecast(filter, memory, odometry, now)
     solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
-
-    def left(c: ForecastCommand) -> tuple[Number, ...]:
-        after = moved(xp, r, m, c, air, HOLD)
-        return rooms(xp, b, filter.limits, after, air, solids, floor, m)
-
-    found = left(wanted)
-    names = tuple(plane.name for plane in solids)
-    if xp is SCALARS and min(found) >= 0.0:
-        return Filtered(wanted, 0.0, *_worst(xp, found), names)
-    back = retreat(xp, filter.limits, m, floor)
-    own = command(xp, b, m, brake(xp, b, m, against(xp, m, air), back))
-    short, limit = _worst(xp, found)
-    share = _least(xp, lambda s: _worst(xp, left(_between_two(wanted, own, s)))[0], 0.0 * short)
-    passes = short >= 0.0
-    share = xp.where(passes, 0.0, share)
-    given = ForecastCommand(*(
-        xp.where(passes, a, xp.where(share >= 1.0, c, a + share * (c - a))) for a, c in zip(wanted, own, strict=True)
-    ))  # fmt: skip
-    return Filtered(given, share, short, limit, names)
+    if filter.native is not None and xp is SCALARS and len(solids) <= SOLIDS:
+        found = filter.native.judge(m, memory.air, wanted, solids, floor)
+    else:
+        found = judged(xp, filter.backup, filter.limits, m, memory.air, wanted, solids, floor)
+    return Filtered(*found, tuple(plane.name for plane in solids))
 
 
-def _worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
-    """The smallest room, and the index of its limit."""
-    if xp is SCALARS:
-        least = min(rooms)
-        return least, rooms.index(least)
-    stacked = xp.stack(rooms)
-    return stacked.min(axis=0), stacked.argmin(axis=0)
-
-
-def _least(xp: Any, spare: Any, zero: Number) -> Number:
-    """The smallest share, in eighths, by which a command must be changed so that enough room is left. 1 if no smaller
-    share is enough.
-    """
-    low, high = zero, zero + 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        good = spare(middle) >= 0.0
-        low, high = xp.where(good, low, middle), xp.where(good, middle, high)
-    return high
-
-
-def _between_two(a: ForecastCommand, b: ForecastCommand, share: Number) -> ForecastCommand:
-    return ForecastCommand(*(x + share * (y - x) for x, y in zip(a, b, strict=True)))
-
-
-def _between(
-    sent: tuple[tuple[float, ForecastCommand], ...], begin: float, end: float
-) -> list[tuple[ForecastCommand, float]]:
-    """The commands that held from `begin` to `end`, s, and for how long. Before the first command, the first one
+def _between(r: Response, sent: tuple[tuple[float, ForecastCommand], ...], begin: float, end: float) -> list[Stretch]:
+    """The commands that held from `begin` to `end`, s, each for a time. Before the first command, the first one
     counts.
     """
-    parts: list[tuple[ForecastCommand, float]] = []
-    for i, (at, c) in enumerate(sent):
-        start = begin if i == 0 else max(at, begin)
+    parts: list[Stretch] = []
+    first = max(bisect_right(sent, begin, key=itemgetter(0)) - 1, 0)
+    past = max(bisect_left(sent, end, key=itemgetter(0)), min(len(sent), 1))
+    for i in range(first, past):
+        start = begin if i == first else sent[i][0]
         stop = min(sent[i + 1][0], end) if i + 1 < len(sent) else end
         if (whole := stop - start) > 1e-6:
             count = max(math.ceil(whole / LONGEST - 1e-6), 1)
-            parts += [(c, round(whole / count, 5))] * count
+            parts += [Stretch(sent[i][1], r.step(round(whole / count, 5)))] * count
     return parts
 
 

@@ -83,6 +83,20 @@ NOTHING = Residual(0.0, 0.0, 0.0, 1.0)
 """Everything is explained."""
 
 
+class ResponseStep(NamedTuple):
+    """How the rate loop and the rotors answer over a time. Create it with `Response.step`."""
+
+    h: Number
+    """The time, s."""
+    x: tuple[Number, Number, Number, Number]
+    """The rate loop about body x: `turning`."""
+    y: tuple[Number, Number, Number, Number]
+    z: Number
+    """The share of the rate error about body z that remains."""
+    rotors: Number
+    """The share of the error of the rotors' speed that remains."""
+
+
 @dataclass(frozen=True)
 class Response:
     """The response of a vehicle. Create it with `Response.of`."""
@@ -97,6 +111,11 @@ class Response:
     """Thrust over mass that an angular acceleration about body x, y, z takes from either end of the thrust range, m."""
     rate_max: tuple[float, float, float]
     """The largest body rates that are commanded, rad/s."""
+
+    def step(self, h: float) -> ResponseStep:
+        """The answer over h s."""
+        (kx, ky, kz), slow = self.gain, self.motor_time
+        return ResponseStep(h, turning(kx, slow, h), turning(ky, slow, h), lag(1 / kz, h)[0], lag(slow, h)[0])
 
     @staticmethod
     def of(vehicle: Vehicle) -> "Response":
@@ -138,13 +157,10 @@ def lag(time_constant: float, h: float) -> tuple[float, float]:
     return left, (1 - left) * time_constant / h
 
 
-def actuated(xp: Any, r: Response, a: Actuators, command: ForecastCommand, h: float) -> Actuators:
-    """The rotors after h s of a command. If a turn needs more than the rotors can give, the turn is slower."""
+def actuated(xp: Any, r: Response, a: Actuators, command: ForecastCommand, step: ResponseStep) -> Actuators:
+    """The rotors after a step of a command. If a turn needs more than the rotors can give, the turn is slower."""
     (kx, ky, kz), (sx, sy, sz), (low, high) = r.gain, r.spread, r.thrust
-    ax, bx, cx, dx = turning(kx, r.motor_time, h)
-    ay, by, cy, dy = turning(ky, r.motor_time, h)
-    left_z, _ = lag(1 / kz, h)
-    left, _ = lag(r.motor_time, h)
+    _, (ax, bx, cx, dx), (ay, by, cy, dy), left_z, left = step
     ex, ey, ez = a.wx - command.x, a.wy - command.y, a.wz - command.z
     angular, half = sx * kx * abs(ex) + sy * ky * abs(ey) + sz * kz * abs(ez) + 1e-9, 0.5 * (high - low)
     scale, angular = xp.minimum(half / angular, 1.0), xp.minimum(angular, half)
@@ -161,9 +177,12 @@ def actuated(xp: Any, r: Response, a: Actuators, command: ForecastCommand, h: fl
     )
 
 
-def moved(xp: Any, r: Response, m: ForecastMotion, command: ForecastCommand, air: Residual, h: float) -> ForecastMotion:
-    """The motion after h s of a command. h is so short that the attitude turns by only a fraction of a radian."""
-    a = actuated(xp, r, Actuators(m.wx, m.wy, m.wz, m.ax, m.ay, m.f), command, h)
+def moved(
+    xp: Any, r: Response, m: ForecastMotion, command: ForecastCommand, air: Residual, step: ResponseStep
+) -> ForecastMotion:
+    """The motion after a step of a command, so short that the attitude turns by only a fraction of a radian."""
+    a = actuated(xp, r, Actuators(m.wx, m.wy, m.wz, m.ax, m.ay, m.f), command, step)
+    h = step.h
     s = 0.25 * h
     tx, ty, tz = s * (m.wx + a.wx), s * (m.wy + a.wy), s * (m.wz + a.wz)  # half of the turn
     w, x, y, z = m.qw, m.qx, m.qy, m.qz
@@ -184,3 +203,34 @@ def moved(xp: Any, r: Response, m: ForecastMotion, command: ForecastCommand, air
         m.vx + h * gx, m.vy + h * gy, m.vz + h * gz,
         qw, qx, qy, qz, a.wx, a.wy, a.wz, a.ax, a.ay, a.f,
     )  # fmt: skip
+
+
+class GyroReading(NamedTuple):
+    """A reading of the gyro, and how fast the rates change."""
+
+    x: Number
+    """Body rate about body x, rad/s."""
+    y: Number
+    z: Number
+    known: Number
+    """1.0: the change is known. 0.0: it is not."""
+    ax: Number
+    """Change of the body rate about body x, rad/s^2."""
+    ay: Number
+
+
+class Stretch(NamedTuple):
+    """A command on its way, the step for which it acts, and the gyro's reading at its end. None: there is none."""
+
+    command: ForecastCommand
+    step: ResponseStep
+    reading: GyroReading | None = None
+
+
+def advanced(xp: Any, r: Response, m: ForecastMotion, air: Residual, stretch: Stretch) -> ForecastMotion:
+    """The motion after a stretch. Rates that the gyro has read are those read."""
+    m = moved(xp, r, m, stretch.command, air, stretch.step)
+    if (seen := stretch.reading) is None:
+        return m
+    ax, ay = xp.where(seen.known > 0.0, seen.ax, m.ax), xp.where(seen.known > 0.0, seen.ay, m.ay)
+    return m._replace(wx=seen.x, wy=seen.y, wz=seen.z, ax=ax, ay=ay)

@@ -72,7 +72,7 @@ def rooms(
     m: ForecastMotion,
     air: Residual,
     solids: tuple[Plane, ...] = (),
-    floor: bool = True,
+    floor: Number = True,
     at: ForecastMotion | None = None,
 ) -> tuple[Number, ...]:
     """The room that the manoeuvre from a state leaves to each limit of `NAMES`, then to each solid. In m, negative
@@ -95,7 +95,7 @@ def rooms(
     _, high_z = _ends(xp, w.pz, dz)
     rough = TURNING * xp.sqrt(m.wx * m.wx + m.wy * m.wy + 1e-9)
     off_x, off_y, off_z = TIMING * abs(m.vx) + rough, TIMING * abs(m.vy) + rough, TIMING * abs(m.vz) + rough
-    low_z = low_z - z0 if floor else z1 - low_z
+    low_z = xp.where(floor, low_z - z0, z1 - low_z)
     found = [
         low_x - x0 - off_x, x1 - high_x - off_x, low_y - y0 - off_y, y1 - high_y - off_y,
         low_z - off_z, z1 - high_z - off_z,
@@ -119,10 +119,10 @@ def against(xp: Any, m: ForecastMotion, air: Residual) -> Residual:
     return Residual(x, y, z, air.share)
 
 
-def retreat(xp: Any, limits: MarginLimits, m: ForecastMotion, floor: bool = True) -> tuple[Number, ...]:
+def retreat(xp: Any, limits: MarginLimits, m: ForecastMotion, floor: Number = True) -> tuple[Number, ...]:
     """The velocity back inside, world, m/s, in proportion to how far a state is beyond the margins or close to them."""
     (x0, y0, z0), (x1, y1, z1) = limits.low, limits.high
-    z0 = z0 if floor else -math.inf
+    z0 = xp.where(floor, z0, -math.inf)
     return tuple(
         RETREAT * (xp.maximum(low + back - at, 0.0) - xp.maximum(at - high + BACK, 0.0))
         for at, low, high, back in ((m.px, x0, x1, BACK), (m.py, y0, y1, BACK), (m.pz, z0, z1, BACK_UP))
