@@ -51,10 +51,10 @@ def worst(xp: Any, rooms: tuple[Number, ...]) -> tuple[Number, Any]:
     if xp is SCALARS:
         least = min(rooms)
         return least + 0.0 * sum(rooms), rooms.index(least)
-    least, index = rooms[0], 0.0
+    least, index = rooms[0], 0
     for i, room in enumerate(rooms[1:], start=1):
         less = room < least
-        least, index = xp.where(less, room, least), xp.where(less, float(i), index)
+        least, index = xp.where(less, room, least), xp.where(less, i, index)
     return least + 0.0 * sum(rooms), index
 
 
