@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import EnvConfig, RewardConfig
+from e2efly.config import DisturbanceConfig, EnvConfig, RewardConfig
 from e2efly.environment import Env, EnvState, expert, random_key
 from e2efly.environment.episodes import EpisodesUnderWay
 from e2efly.simulation import rewards
@@ -75,11 +75,30 @@ def test_its_own_action_costs_nothing_and_any_other_does() -> None:
 
 
 def test_a_heavier_vehicle_is_given_more_thrust() -> None:
-    env = forests(8.0, randomize={"mass": 0.2})
+    env = forests(0.5, randomize={"mass": 0.2}, action_latency=(0.0, 0.0))
     state, _ = begun(env, 3, 16)
     even = dataclasses.replace(state, plant={"mass": jnp.full(16, env.physics.nominal.mass)})
     ratio = env.command(env.expert_action(state))[:, 0] / env.command(env.expert_action(even))[:, 0]
     np.testing.assert_allclose(ratio, state.plant["mass"] / env.physics.nominal.mass, rtol=1e-4)
+
+
+def test_rotors_of_unequal_strength_around_another_centre_of_mass_turn_the_vehicle_by_as_much_as_it_says() -> None:
+    env, n = forests(5.0, disturbance=DisturbanceConfig(thrust=0.2, rotor=0.1, centre_of_mass=0.004)), 30
+    state, _ = begun(env, 5, n)
+    hover = jnp.tile(jnp.array([9.81, 0.0, 0.0, 0.0]), (n, 1))
+    assert state.disturbance is not None
+    answer = expert.Answer.of(env.physics.nominal, state.plant, state.disturbance.share(state.time))
+    np.testing.assert_allclose(answer.given(answer.needed(hover)[:, None])[:, 0], hover, atol=1e-5)
+    step, rates = jax.jit(env.step, static_argnames="restart"), []
+    for command in (hover, answer.needed(hover)):
+        flown, action = state, (command - env.center) / env.half
+        for _ in range(40):
+            flown, _ = step(flown, action, restart=False)
+        rates.append(np.linalg.norm(flown.vehicle.body_rate[:, :2], axis=1))
+        falls = np.abs(flown.vehicle.velocity[:, 2])
+    assert np.median(rates[0]) > 0.3
+    assert np.mean(rates[1]) < 0.05 * np.mean(rates[0])
+    assert np.max(falls) < 0.1
 
 
 @pytest.mark.parametrize(("task", "mode"), [("hover", "ctbr"), ("avoid", "velocity")])

@@ -486,17 +486,16 @@ class Env:
         assert isinstance(self.task, Guided)
         state = jax.lax.stop_gradient(state)
         vehicle = self._physics(state.family).nominal
-        queue, latency = self.command(state.actions), state.action_latency
         known = {name: state.plant[name] for name in ("rate_gain", "motor_time_constant") if name in state.plant}
         flown = dataclasses.replace(vehicle, **known)
-        motion = expert.ahead(flown, state.vehicle, queue, latency, self.control_period)
-        velocity, yaw = self.task.expert(state.memory, motion.position.stack(), motion.velocity.stack())
-        command = expert.command(flown, (self.center + self.half)[0], motion, velocity, yaw)
-        needed = state.plant.get("mass", vehicle.mass) / vehicle.mass
-        if state.disturbance is not None:
-            lifted = state.disturbance.share(state.time / self.task.episode_s)
-            needed = needed / jnp.mean(lifted, axis=-1)
-        command = command.at[:, 0].multiply(needed)
+        progress = state.time / self.task.episode_s
+        share = jnp.ones((len(progress), 4)) if state.disturbance is None else state.disturbance.share(progress)
+        answer = expert.Answer.of(flown, state.plant, share)
+        queue = answer.given(self.command(state.actions))
+        motion = expert.ahead(flown, state.vehicle, queue, state.action_latency, self.control_period)
+        pilot = expert.pilot(flown, (self.center + self.half)[0] * answer.thrust)
+        velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion))
+        command = answer.needed(expert.command(pilot, motion, velocity, yaw))
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 
     def _measured(self, state: EnvState) -> State:

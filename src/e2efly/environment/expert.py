@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from e2efly.control import Quat, Vec3
 from e2efly.control.cascade import reach
 from e2efly.simulation.physics import State
+from e2efly.tasks.task import AGILE, Flier
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -22,6 +23,12 @@ RESERVE = 1.15
 DAMPED = 0.6
 """The expert's attitude gains are at most this, divided by the lag of the body rates."""
 
+FOLLOWS = 0.85
+"""The lag of the acceleration, multiplied by the attitude gain."""
+
+UPRIGHT = 0.3
+"""The smallest cosine of the tilt with which the level acceleration is computed."""
+
 
 @dataclass(frozen=True)
 class ExpertMotion:
@@ -30,6 +37,41 @@ class ExpertMotion:
     position: Vec3
     velocity: Vec3
     attitude: Quat
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a drawn vehicle makes of a command. Its flight controller takes it for the vehicle of the file."""
+
+    thrust: Float[Array, " n"]
+    """Collective thrust over mass, divided by the commanded one."""
+    turn: Float[Array, "n 3"]
+    """The body rate that the rate loop leaves beyond the commanded one, divided by the commanded thrust over mass,
+    rad s/m. Rotors of unequal strength, or around another centre of mass, turn the vehicle."""
+
+    @staticmethod
+    def of(vehicle: Vehicle, plant: dict[str, Array], share: Float[Array, "n 4"]) -> "Answer":
+        """The answer of a vehicle with these parameters, whose rotors give these shares of their thrust.
+
+        A rate loop without an integral part comes to rest where its torque, J K times the rate error, is against that
+        of the rotors. J is the inertia of the file, K the gain.
+        """
+        mass, mean = plant.get("mass", vehicle.mass) / vehicle.mass, jnp.mean(share, axis=-1)
+        arm = plant.get("rotor_position", jnp.asarray(vehicle.rotor_position))
+        push = vehicle.mass / 4 * share
+        torque = jnp.stack([jnp.sum(push * arm[..., 1], -1), -jnp.sum(push * arm[..., 0], -1)], axis=-1)
+        turn = torque / (vehicle.inertia * vehicle.rate_gain)[..., :2] / mean[:, None]
+        return Answer(mean / mass, jnp.pad(turn, ((0, 0), (0, 1))))
+
+    def given(self, commands: Float[Array, "n k 4"]) -> Float[Array, "n k 4"]:
+        """What commands give: thrust over mass, m/s^2, and body rates, rad/s."""
+        thrust, rate = commands[..., :1], commands[..., 1:]
+        return jnp.concatenate([thrust * self.thrust[:, None, None], rate + thrust * self.turn[:, None]], axis=-1)
+
+    def needed(self, command: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
+        """The command that gives this one."""
+        thrust, rate = command[:, :1] / self.thrust[:, None], command[:, 1:]
+        return jnp.concatenate([thrust, rate - thrust * self.turn], axis=-1)
 
 
 def ahead(
@@ -67,30 +109,43 @@ def ahead(
     return ExpertMotion(position, velocity, attitude)
 
 
-def command(
-    vehicle: Vehicle,
-    largest: Float[Array, ""],
-    motion: ExpertMotion,
-    velocity: Float[Array, "n 3"],
-    yaw: Float[Array, " n"],
-) -> Float[Array, "n 4"]:
-    """Collective thrust, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
+def pilot(vehicle: Vehicle, largest: Float[Array, " n"]) -> Vehicle:
+    """The vehicle with the limits of tilt and acceleration that its rotors carry, and attitude gains for its lag.
 
     Args:
-        vehicle: the vehicle that flies. Its own limits of tilt and acceleration are not used.
+        vehicle: the vehicle that flies. Its own limits are not used.
         largest: the largest collective thrust of all rotors over mass, m/s^2.
-        motion: the motion of the vehicle.
-        velocity: the desired velocity.
-        yaw: the desired yaw.
     """
     tilt = jnp.arccos(jnp.clip(RESERVE * GRAVITY / largest, 0.0, 1.0))
     level = GRAVITY * jnp.tan(tilt)
-    pilot = dataclasses.replace(
+    return dataclasses.replace(
         vehicle,
         tilt_max=tilt,
         acceleration_max=jnp.stack([level, level, jnp.full_like(level, GRAVITY)], axis=-1),
         attitude_gain=jnp.minimum(vehicle.attitude_gain, DAMPED / _lag(vehicle)[..., jnp.array([0, 2])]),
     )
+
+
+def flier(pilot: Vehicle, motion: ExpertMotion) -> Flier:
+    """What a task's expert knows of the motion."""
+    position, up = motion.position.stack(), motion.attitude.z_axis()
+    pushed = GRAVITY / jnp.maximum(up.z, UPRIGHT)
+    most = jnp.minimum(pilot.acceleration_max[..., 0], AGILE)
+    lag = jnp.broadcast_to(FOLLOWS / pilot.attitude_gain[..., 0], most.shape)
+    return Flier(position, motion.velocity.stack(), jnp.stack([pushed * up.x, pushed * up.y], axis=-1), most, lag)
+
+
+def command(
+    pilot: Vehicle, motion: ExpertMotion, velocity: Float[Array, "n 3"], yaw: Float[Array, " n"]
+) -> Float[Array, "n 4"]:
+    """Collective thrust over mass, m/s^2, and body rates, rad/s, towards a velocity in the world, m/s, and a yaw, rad.
+
+    Args:
+        pilot: the vehicle, from `pilot`.
+        motion: the motion of the vehicle.
+        velocity: the desired velocity.
+        yaw: the desired yaw.
+    """
     out = reach(pilot, motion, Vec3.of(velocity), yaw)
     return jnp.concatenate([out.thrust[:, None], out.rate.stack()], axis=-1)
 

@@ -1,6 +1,7 @@
 """The interface between tasks and the environment."""
 
 import dataclasses
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol, runtime_checkable
 
@@ -71,13 +72,37 @@ class Task(Protocol):
         ...
 
 
+AGILE, LAG = 14.0, 0.12
+"""Largest level acceleration of a usual vehicle, m/s^2, and the lag of its acceleration, s."""
+
+
+@dataclass(frozen=True)
+class Flier:
+    """The motion from which an expert flies on, and how agile its vehicle is."""
+
+    position: Float[Array, "n 3"]
+    """World, m."""
+    velocity: Float[Array, "n 3"]
+    """World, m/s."""
+    pushed: Float[Array, "n 2"]
+    """Level acceleration that the present attitude gives, m/s^2."""
+    most: Float[Array, " n"]
+    """Largest level acceleration, m/s^2."""
+    lag: Float[Array, " n"]
+    """Lag of the acceleration behind the commanded one, s."""
+
+    @staticmethod
+    def usual(position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]) -> "Flier":
+        """A vehicle of usual agility, whose attitude is level."""
+        n = position.shape[0]
+        return Flier(position, velocity, jnp.zeros((n, 2)), jnp.full(n, AGILE), jnp.full(n, LAG))
+
+
 @runtime_checkable
 class Guided(Protocol):
     """A task that an expert with knowledge of the whole world can fly. The reward term `imitate` needs it."""
 
-    def expert(
-        self, memory: Any, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
-    ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    def expert(self, memory: Any, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
         """The expert's velocity, world, m/s, and yaw, rad."""
         ...
 

@@ -49,7 +49,7 @@ def _operation(form: str) -> Callable[..., "Symbol"]:
 class Symbol:
     """A number of the function."""
 
-    __slots__ = ("name", "function")
+    __slots__ = ("function", "name")
 
     def __init__(self, function: "TracedFunction", name: str) -> None:
         """A number with a name in C."""

@@ -15,7 +15,7 @@ from e2efly.simulation.scenes.generate import forest
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.tasks.avoid.goal import CLIMB, AvoidGoal, AvoidMemory
 from e2efly.tasks.avoid.pilot import best_heading
-from e2efly.tasks.task import at_rest, between, struck, uniform
+from e2efly.tasks.task import Flier, at_rest, between, struck, uniform
 
 STRICT = 1.5
 """Vertical speed of the expert divided by its height error, 1/s."""
@@ -44,19 +44,15 @@ class Avoid(AvoidGoal):
         trees = forest(trees_key, n, c.forest, state.position, end)
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), AvoidWorld(speed, trees)
 
-    def expert(
-        self, memory: AvoidWorld, position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]
-    ) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+    def expert(self, memory: AvoidWorld, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
         """Velocity, m/s, and yaw, rad, of an expert that knows every tree.
 
         The yaw is half-way between the bearing of the goal and the heading of the velocity.
         """
-        away = self.goal(memory, memory.speed) - position
+        away = self.goal(memory, memory.speed) - flier.position
         bearing = jnp.arctan2(away[:, 1], away[:, 0])
         side = self.config.forest.width / 2
-        heading = best_heading(
-            memory.trees, position[:, :2], velocity[:, :2], bearing, memory.speed, self.shape.radius, side
-        )
+        heading = best_heading(memory.trees, flier, bearing, memory.speed, self.shape.radius, side)
         level = memory.speed[:, None] * jnp.stack([jnp.cos(heading), jnp.sin(heading)], axis=-1)
         climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
         return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
@@ -76,6 +72,6 @@ class Avoid(AvoidGoal):
         """The goal's verdict, with signals for the reward."""
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
         moved, outcome = self.verdict(memory, before, after, time, hit)
-        wanted, _ = self.expert(memory, after.position, after.velocity)
+        wanted, _ = self.expert(memory, Flier.usual(after.position, after.velocity))
         signals = {"desired_velocity": wanted, "desired_speed": memory.speed}
         return moved, dataclasses.replace(outcome, signals=signals)
