@@ -87,18 +87,18 @@ def test_rotors_of_unequal_strength_around_another_centre_of_mass_turn_the_vehic
     state, _ = begun(env, 5, n)
     hover = jnp.tile(jnp.array([9.81, 0.0, 0.0, 0.0]), (n, 1))
     assert state.disturbance is not None
-    answer = expert.Answer.of(env.physics.nominal, state.plant, state.disturbance.share(state.time))
-    np.testing.assert_allclose(answer.given(answer.needed(hover)[:, None])[:, 0], hover, atol=1e-5)
-    step, rates = jax.jit(env.step, static_argnames="restart"), []
-    for command in (hover, answer.needed(hover)):
+    effect = expert.CommandEffect.of(env.physics.nominal, state.plant, state.disturbance.share(state.time))
+    np.testing.assert_allclose(effect.given(effect.needed(hover)[:, None])[:, 0], hover, atol=1e-5)
+    step, rates, falls = jax.jit(env.step, static_argnames="restart"), [], []
+    for command in (hover, effect.needed(hover)):
         flown, action = state, (command - env.center) / env.half
         for _ in range(40):
             flown, _ = step(flown, action, restart=False)
         rates.append(np.linalg.norm(flown.vehicle.body_rate[:, :2], axis=1))
-        falls = np.abs(flown.vehicle.velocity[:, 2])
+        falls.append(np.abs(flown.vehicle.velocity[:, 2]))
     assert np.median(rates[0]) > 0.3
     assert np.mean(rates[1]) < 0.05 * np.mean(rates[0])
-    assert np.max(falls) < 0.1
+    assert np.mean(falls[1]) < 0.3 * np.mean(falls[0])
 
 
 @pytest.mark.parametrize(("task", "mode"), [("hover", "ctbr"), ("avoid", "velocity")])

@@ -490,12 +490,12 @@ class Env:
         flown = dataclasses.replace(vehicle, **known)
         progress = state.time / self.task.episode_s
         share = jnp.ones((len(progress), 4)) if state.disturbance is None else state.disturbance.share(progress)
-        answer = expert.Answer.of(flown, state.plant, share)
-        queue = answer.given(self.command(state.actions))
+        effect = expert.CommandEffect.of(flown, state.plant, share)
+        queue = effect.given(self.command(state.actions))
         motion = expert.ahead(flown, state.vehicle, queue, state.action_latency, self.control_period)
-        pilot = expert.pilot(flown, (self.center + self.half)[0] * answer.thrust)
+        pilot = expert.pilot(flown, (self.center + self.half)[0] * effect.thrust)
         velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion))
-        command = answer.needed(expert.command(pilot, motion, velocity, yaw))
+        command = effect.needed(expert.command(pilot, motion, velocity, yaw))
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 
     def _measured(self, state: EnvState) -> State:

@@ -40,7 +40,7 @@ class ExpertMotion:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandEffect:
     """What a drawn vehicle makes of a command. Its flight controller takes it for the vehicle of the file."""
 
     thrust: Float[Array, " n"]
@@ -50,8 +50,8 @@ class Answer:
     rad s/m. Rotors of unequal strength, or around another centre of mass, turn the vehicle."""
 
     @staticmethod
-    def of(vehicle: Vehicle, plant: dict[str, Array], share: Float[Array, "n 4"]) -> "Answer":
-        """The answer of a vehicle with these parameters, whose rotors give these shares of their thrust.
+    def of(vehicle: Vehicle, plant: dict[str, Array], share: Float[Array, "n 4"]) -> "CommandEffect":
+        """The effect for a vehicle with these parameters, whose rotors give these shares of their thrust.
 
         A rate loop without an integral part comes to rest where its torque, J K times the rate error, is against that
         of the rotors. J is the inertia of the file, K the gain.
@@ -61,7 +61,7 @@ class Answer:
         push = vehicle.mass / 4 * share
         torque = jnp.stack([jnp.sum(push * arm[..., 1], -1), -jnp.sum(push * arm[..., 0], -1)], axis=-1)
         turn = torque / (vehicle.inertia * vehicle.rate_gain)[..., :2] / mean[:, None]
-        return Answer(mean / mass, jnp.pad(turn, ((0, 0), (0, 1))))
+        return CommandEffect(mean / mass, jnp.pad(turn, ((0, 0), (0, 1))))
 
     def given(self, commands: Float[Array, "n k 4"]) -> Float[Array, "n k 4"]:
         """What commands give: thrust over mass, m/s^2, and body rates, rad/s."""
