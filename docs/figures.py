@@ -152,7 +152,7 @@ The policies are by the presets `nominal` of that day, in race_clutter one polic
 Today's presets are `robust`, and race_clutter has one policy for all tracks: [the zoo by
 sight](#the-zoos-policies-that-see-under-stress-of-the-vehicle-and-of-its-cameras).""",
     "expert": """
-It knows every trunk, and the mass, thrust, delay, motors and rate loop of its vehicle, but not its
+It knows every trunk, and the mass, thrust, centre of mass, delay, motors and rate loop of its vehicle, but not its
 inertia or the wind. Policies that imitate it have to see the trunks.""",
     "raptor": """
 Success: within 0.1 m for the last second of 8 s. The rows are explained in
