@@ -101,6 +101,19 @@ def test_rotors_of_unequal_strength_around_another_centre_of_mass_turn_the_vehic
     assert np.mean(falls[1]) < 0.3 * np.mean(falls[0])
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "env"),
+    [
+        ("any", {}),
+        ("crazyflie", {"randomize": {"mass": 0.3}, "disturbance": DisturbanceConfig(thrust=0.45)}),
+    ],
+)
+def test_it_flies_vehicles_of_a_family_and_such_that_hardly_carry_themselves(vehicle: str, env: dict) -> None:
+    task = Env.of(TASKS["avoid"](), IMITATE, EnvConfig(vehicle=vehicle, **env))
+    state, _ = begun(task, 6, 203)
+    assert np.isfinite(jax.jit(task.expert_action)(state)).all()
+
+
 @pytest.mark.parametrize(("task", "mode"), [("hover", "ctbr"), ("avoid", "velocity")])
 def test_where_there_is_no_expert_the_term_is_refused_by_name(task: str, mode: str) -> None:
     env = Env.of(TASKS[task](), IMITATE, EnvConfig(command_mode=mode))

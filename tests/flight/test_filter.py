@@ -312,6 +312,27 @@ def test_a_fence_in_which_it_could_not_stop_is_refused_by_name(axis: int) -> Non
     assert stopping_distance(accepted, 3.0) <= 2.0 < stopping_distance(accepted, 6.0)
 
 
+@pytest.mark.parametrize("tilt", [1.0, 1.4])
+@pytest.mark.parametrize("share", [1.0, 0.8])
+@pytest.mark.parametrize("vz", [-6.0, -2.0, 0.0, 1.0, 4.0, 8.0])
+@pytest.mark.parametrize("name", ["vis_r", "vis_h"])
+def test_the_manoeuvre_stops_within_the_room_that_it_is_said_to_need(
+    name: str, vz: float, share: float, tilt: float
+) -> None:
+    backup, air = Backup.of(load_vehicle(name), tilt), NOTHING._replace(share=share)
+    limits = MarginLimits((0.0,) * 3, (0.0,) * 3, 99.0, math.inf)
+    for v in (2.0, 5.0, 8.0, 12.0):
+        begun = m = state(v=v, vz=vz)
+        needed = backup.margin - rooms(SCALARS, backup, limits, m, NOTHING)[NAMES.index("x high")]
+        farthest = 0.0
+        for k in range(500):
+            known = NOTHING._replace(share=max(share, 1.0 - 0.01 * k))  # a lost fifth is noticed within 0.2 s
+            given = command(SCALARS, backup, m, brake(SCALARS, backup, m, known))
+            m = moved(SCALARS, backup.response, m, given, air, STEP)
+            farthest = max(farthest, m.px - begun.px)
+        assert farthest < needed
+
+
 WEAK = dataclasses.replace(VEHICLE, rotor_thrust_max=float(VEHICLE.mass) * GRAVITY / 4 * 1.4)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.flight.filter import native
-from e2efly.flight.filter.filter import Filter, FilterMemory, compiled, feel, filtered, remember, watch
+from e2efly.flight.filter.filter import Filter, FilterMemory, compiled, feel, filtered, forecast, remember, watch
 from e2efly.flight.filter.forecast import ForecastCommand
 from e2efly.flight.filter.guard import FilterError, keep
 from e2efly.flight.settings import Fence
@@ -81,3 +81,19 @@ def test_without_a_compiler_and_with_one_that_fails_it_says_so(monkeypatch: pyte
     monkeypatch.setenv("PATH", "")
     with pytest.raises(OSError, match="no C compiler 'cc' is on the path"):
         compiled(filter)
+
+
+def test_a_branch_on_a_symbol_is_refused() -> None:
+    function = native.TracedFunction("f", 2)
+    a, b = function.inputs
+    with pytest.raises(TypeError, match="`where`"):
+        max(a, b)
+
+
+def test_a_reading_of_the_odometry_s_own_time_counts() -> None:
+    memory, seen, _ = next(situations(1))
+    filter = Filter.of(VEHICLE, FENCE, 0.09)
+    known = watch(filter, dataclasses.replace(memory, felt=()), seen, 0.0, flying=True)
+    read = feel(known, (1.0, 2.0, 3.0), math.nextafter(-0.09, 0.0))
+    for of in (filter, compiled(filter)):
+        assert forecast(of, read, seen, 0.0).wz != forecast(of, known, seen, 0.0).wz

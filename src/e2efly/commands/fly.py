@@ -27,7 +27,7 @@ from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
 from e2efly.flight.excitation import NAME as EXCITATION
-from e2efly.flight.filter.filter import Filter, compiled
+from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
 from e2efly.flight.log_record import Log, Logs
 from e2efly.flight.operator import Speaker, Stop
@@ -206,11 +206,9 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
     hover = hover_controller(options.hover, body, body.latency if options.latency is None else options.latency)
     filter = None
     if options.guard == "filter":
-        filter = Filter.of(body, settings.fence, options.latency)
-        try:
-            filter = compiled(filter)
-        except OSError as error:
-            console.print(f"The filter runs in Python, which takes several times as long: {error}.", markup=False)
+        filter, why = fastest(Filter.of(body, settings.fence, options.latency))
+        if why is not None:
+            console.print(f"The filter runs in Python, which takes several times as long: {why}.", markup=False)
     runtime = None
     if loaded is not None:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):

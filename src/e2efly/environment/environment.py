@@ -485,7 +485,8 @@ class Env:
         """
         assert isinstance(self.task, Guided)
         state = jax.lax.stop_gradient(state)
-        vehicle = self._physics(state.family).nominal
+        physics = self._physics(state.family)
+        vehicle = physics.nominal
         known = {name: state.plant[name] for name in ("rate_gain", "motor_time_constant") if name in state.plant}
         flown = dataclasses.replace(vehicle, **known)
         progress = state.time / self.task.episode_s
@@ -493,7 +494,8 @@ class Env:
         effect = expert.CommandEffect.of(flown, state.plant, share)
         queue = effect.given(self.command(state.actions))
         motion = expert.ahead(flown, state.vehicle, queue, state.action_latency, self.control_period)
-        pilot = expert.pilot(flown, (self.center + self.half)[0] * effect.thrust)
+        largest = jnp.minimum((self.center + self.half)[0], 4 * physics.mixer.thrust_max / vehicle.mass)
+        pilot = expert.pilot(flown, largest * effect.thrust)
         velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion))
         command = effect.needed(expert.command(pilot, motion, velocity, yaw))
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)

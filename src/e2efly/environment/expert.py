@@ -5,6 +5,7 @@ for the moment when an action that is chosen now takes effect. Until then, the v
 """
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import jax.numpy as jnp
@@ -19,6 +20,9 @@ from e2efly.vehicles.vehicle import Vehicle
 
 RESERVE = 1.15
 """The expert tilts only so far that its rotors have to carry at most this times its weight."""
+
+LEAST_TILT = 0.2
+"""The expert may tilt so far, rad, even where the rotors hardly carry the weight."""
 
 DAMPED = 0.6
 """The expert's attitude gains are at most this, divided by the lag of the body rates."""
@@ -45,7 +49,7 @@ class CommandEffect:
 
     thrust: Float[Array, " n"]
     """Collective thrust over mass, divided by the commanded one."""
-    turn: Float[Array, "n 3"]
+    rate_offset: Float[Array, "n 3"]
     """The body rate that the rate loop leaves beyond the commanded one, divided by the commanded thrust over mass,
     rad s/m. Rotors of unequal strength, or around another centre of mass, turn the vehicle."""
 
@@ -54,24 +58,28 @@ class CommandEffect:
         """The effect for a vehicle with these parameters, whose rotors give these shares of their thrust.
 
         A rate loop without an integral part comes to rest where its torque, J K times the rate error, is against that
-        of the rotors. J is the inertia of the file, K the gain.
+        of the rotors. J is the inertia of the file, K the gain. The file's own arms are balanced by its mixer.
         """
         mass, mean = plant.get("mass", vehicle.mass) / vehicle.mass, jnp.mean(share, axis=-1)
-        arm = plant.get("rotor_position", jnp.asarray(vehicle.rotor_position))
-        push = vehicle.mass / 4 * share
-        torque = jnp.stack([jnp.sum(push * arm[..., 1], -1), -jnp.sum(push * arm[..., 0], -1)], axis=-1)
-        turn = torque / (vehicle.inertia * vehicle.rate_gain)[..., :2] / mean[:, None]
-        return CommandEffect(mean / mass, jnp.pad(turn, ((0, 0), (0, 1))))
+        arm = jnp.asarray(vehicle.rotor_position)
+        uneven = plant.get("rotor_position", arm) * share[..., None] - arm
+        torque = jnp.asarray(vehicle.mass)[..., None] / 4 * jnp.sum(uneven, axis=-2)[..., ::-1] * jnp.array([1.0, -1.0])
+        offset = torque / (vehicle.inertia * vehicle.rate_gain)[..., :2] / mean[:, None]
+        if vehicle.rate_integral_gain is not None:
+            offset = 0.0 * offset
+        return CommandEffect(mean / mass, jnp.pad(offset, ((0, 0), (0, 1))))
 
     def given(self, commands: Float[Array, "n k 4"]) -> Float[Array, "n k 4"]:
         """What commands give: thrust over mass, m/s^2, and body rates, rad/s."""
         thrust, rate = commands[..., :1], commands[..., 1:]
-        return jnp.concatenate([thrust * self.thrust[:, None, None], rate + thrust * self.turn[:, None]], axis=-1)
+        return jnp.concatenate(
+            [thrust * self.thrust[:, None, None], rate + thrust * self.rate_offset[:, None]], axis=-1
+        )
 
     def needed(self, command: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
         """The command that gives this one."""
         thrust, rate = command[:, :1] / self.thrust[:, None], command[:, 1:]
-        return jnp.concatenate([thrust, rate - thrust * self.turn], axis=-1)
+        return jnp.concatenate([thrust, rate - thrust * self.rate_offset], axis=-1)
 
 
 def ahead(
@@ -116,7 +124,7 @@ def pilot(vehicle: Vehicle, largest: Float[Array, " n"]) -> Vehicle:
         vehicle: the vehicle that flies. Its own limits are not used.
         largest: the largest collective thrust of all rotors over mass, m/s^2.
     """
-    tilt = jnp.arccos(jnp.clip(RESERVE * GRAVITY / largest, 0.0, 1.0))
+    tilt = jnp.arccos(jnp.clip(RESERVE * GRAVITY / largest, 0.0, math.cos(LEAST_TILT)))
     level = GRAVITY * jnp.tan(tilt)
     return dataclasses.replace(
         vehicle,
@@ -129,10 +137,10 @@ def pilot(vehicle: Vehicle, largest: Float[Array, " n"]) -> Vehicle:
 def flier(pilot: Vehicle, motion: ExpertMotion) -> Flier:
     """What a task's expert knows of the motion."""
     position, up = motion.position.stack(), motion.attitude.z_axis()
-    pushed = GRAVITY / jnp.maximum(up.z, UPRIGHT)
+    per = GRAVITY / jnp.maximum(up.z, UPRIGHT)
     most = jnp.minimum(pilot.acceleration_max[..., 0], AGILE)
     lag = jnp.broadcast_to(FOLLOWS / pilot.attitude_gain[..., 0], most.shape)
-    return Flier(position, motion.velocity.stack(), jnp.stack([pushed * up.x, pushed * up.y], axis=-1), most, lag)
+    return Flier(position, motion.velocity.stack(), jnp.stack([per * up.x, per * up.y], axis=-1), most, lag)
 
 
 def command(

@@ -76,6 +76,7 @@ AGILE, LAG = 14.0, 0.12
 """Largest level acceleration of a usual vehicle, m/s^2, and the lag of its acceleration, s."""
 
 
+@jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Flier:
     """The motion from which an expert flies on, and how agile its vehicle is."""
@@ -84,9 +85,9 @@ class Flier:
     """World, m."""
     velocity: Float[Array, "n 3"]
     """World, m/s."""
-    pushed: Float[Array, "n 2"]
+    acceleration: Float[Array, "n 2"]
     """Level acceleration that the present attitude gives, m/s^2."""
-    most: Float[Array, " n"]
+    acceleration_max: Float[Array, " n"]
     """Largest level acceleration, m/s^2."""
     lag: Float[Array, " n"]
     """Lag of the acceleration behind the commanded one, s."""

@@ -13,7 +13,7 @@ from e2efly.flight.betaflight.link import Link, open_link
 from e2efly.flight.betaflight.settings_check import hover_schedule
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
-from e2efly.flight.filter.filter import Filter, compiled
+from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, loop_rate
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
@@ -96,7 +96,7 @@ class Session:
         self.bridge = Bridge(
             self.client, self.info, self.source, vehicle, settings,
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
-            filter=compiled(Filter.of(vehicle, settings.fence, late)) if filtered else None, hover=hover,
+            filter=fastest(Filter.of(vehicle, settings.fence, late))[0] if filtered else None, hover=hover,
         )  # fmt: skip
         self.flown = FlownSession()
         self.lateness = 0.0

@@ -38,6 +38,8 @@ CLIMB_SHARE = 0.85
 """Share of that thrust that may point up to brake a fall. Braking sideways gets the rest."""
 SINK = 4.5
 """Deceleration of a climb, m/s^2. The remaining thrust can still brake sideways."""
+LEAST_BRAKING = 0.05
+"""The least deceleration that is assumed, m/s^2."""
 GUST = 0.4
 """How strongly the air may push against the braking, m/s^2: a gust of 3 m/s at 10 m/s, for the vehicles that are
 shipped."""
@@ -73,6 +75,8 @@ class Backup:
     """Deceleration of a fall that is commanded, m/s^2."""
     braking: tuple[float, float, float]
     """Decelerations that are assumed sideways, for a fall and for a climb, m/s^2."""
+    beside: tuple[float, float]
+    """Decelerations that are assumed sideways while a fall and while a climb is braked, m/s^2."""
     steepest: float
     """The largest tilt, rad."""
     rate: float
@@ -109,8 +113,11 @@ class Backup:
         steepest = min(STEEPEST, tilt - LEAN_MARGIN)
         level = min(0.8 * most, GRAVITY * math.tan(min(steepest, 1.05)))
         braking = (COUNTED[0] * level - GUST, COUNTED[1] * climb - GUST, SINK - GUST)
+        # a fall takes CLIMB_SHARE of the thrust; a climb leaves so little of it that the tilt is what limits
+        left = (math.sqrt(1.0 - CLIMB_SHARE**2) * most, (GRAVITY - SINK) * math.tan(steepest))
+        falling, climbing = (max(COUNTED[0] * min(level, x) - GUST, LEAST_BRAKING) for x in left)
         rate = TURN_RATE * min(response.rate_max[:2])
-        return Backup(response, most, level, climb, braking, steepest, rate, steps_of(response))
+        return Backup(response, most, level, climb, braking, (falling, climbing), steepest, rate, steps_of(response))
 
 
 class Brake(NamedTuple):

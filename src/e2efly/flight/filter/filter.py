@@ -28,6 +28,7 @@ from e2efly.flight.filter.forecast import (
     Stretch,
     actuated,
     advanced,
+    measured,
 )
 from e2efly.flight.filter.judgement import judged
 from e2efly.flight.filter.margins import NAMES, MarginLimits, near, rooms
@@ -85,6 +86,14 @@ def compiled(filter: Filter) -> Filter:
         OSError: without a C compiler, or if it fails.
     """
     return replace(filter, native=Native(filter.backup, filter.limits))
+
+
+def fastest(filter: Filter) -> tuple[Filter, str | None]:
+    """The filter as machine code where that can be made. Otherwise as it is, and why."""
+    try:
+        return compiled(filter), None
+    except OSError as error:
+        return filter, str(error)
 
 
 def stopping_distance(filter: Filter, speed: float) -> float:
@@ -249,7 +258,8 @@ def forecast(filter: Filter, memory: FilterMemory, odometry: Odometry, now: floa
     a = memory.actuators
     ax, ay, f = (0.0, 0.0, GRAVITY) if a is None else (a.ax, a.ay, a.f)
     m = ForecastMotion(px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, ax, ay, f)
-    stretches = _stretches(filter, memory, now)
+    first, stretches = _stretches(filter, memory, now)
+    m = measured(xp, m, first)
     if filter.native is not None and xp is SCALARS:
         return filter.native.forecast(m, memory.air, stretches)
     for stretch in stretches:
@@ -257,18 +267,22 @@ def forecast(filter: Filter, memory: FilterMemory, odometry: Odometry, now: floa
     return m
 
 
-def _stretches(filter: Filter, memory: FilterMemory, now: float) -> list[Stretch]:
+def _stretches(filter: Filter, memory: FilterMemory, now: float) -> tuple[GyroReading | None, list[Stretch]]:
     """What acts from the odometry until a command of now begins to: the commands on their way, and the gyro's readings,
-    each at the end of a stretch. A reading in a time of no length follows that of the stretch before it.
+    each at the end of a stretch. The first one returned was read at the odometry's own time. None: none was.
     """
     r, begin, before, found = filter.backup.response, memory.since - filter.latency, None, list[Stretch]()
+    first: GyroReading | None = None
     for at, rate in memory.felt:
         if begin < at <= now:
             found += _between(r, memory.sent, begin, at)
+            reading = _reading(rate, at, before)
             if found:
-                found[-1] = found[-1]._replace(reading=_reading(rate, at, before))
+                found[-1] = found[-1]._replace(reading=reading)
+            else:
+                first = reading
             begin, before = at, (at, rate)
-    return found + _between(r, memory.sent, begin, now)
+    return first, found + _between(r, memory.sent, begin, now)
 
 
 def _reading(rate: tuple[float, float, float], at: float, before: tuple[float, Any] | None) -> GyroReading:

@@ -228,9 +228,14 @@ class Stretch(NamedTuple):
 
 
 def advanced(xp: Any, r: Response, m: ForecastMotion, air: Residual, stretch: Stretch) -> ForecastMotion:
-    """The motion after a stretch. Rates that the gyro has read are those read."""
-    m = moved(xp, r, m, stretch.command, air, stretch.step)
-    if (seen := stretch.reading) is None:
+    """The motion after a stretch."""
+    return measured(xp, moved(xp, r, m, stretch.command, air, stretch.step), stretch.reading)
+
+
+def measured(xp: Any, m: ForecastMotion, reading: GyroReading | None) -> ForecastMotion:
+    """The motion with the body rates that the gyro has read, and with their change, where it is known."""
+    if reading is None:
         return m
-    ax, ay = xp.where(seen.known > 0.0, seen.ax, m.ax), xp.where(seen.known > 0.0, seen.ay, m.ay)
-    return m._replace(wx=seen.x, wy=seen.y, wz=seen.z, ax=ax, ay=ay)
+    known = reading.known > 0.0
+    ax, ay = xp.where(known, reading.ax, m.ax), xp.where(known, reading.ay, m.ay)
+    return m._replace(wx=reading.x, wy=reading.y, wz=reading.z, ax=ax, ay=ay)

@@ -84,7 +84,11 @@ def rooms(
     w = way(xp, b, m, k, air)
     level, fall, rise = b.braking
     side = xp.sqrt(w.vx * w.vx + w.vy * w.vy + 1e-9)
-    run = run_out(xp, side, level) / side
+    # while the vertical speed is braked, less thrust is left for the level one
+    climbs = w.vz > 0.0
+    busy, beside = xp.where(climbs, w.vz / rise, -w.wz / fall), xp.where(climbs, b.beside[1], b.beside[0])
+    after = xp.maximum(side - beside * busy, 0.0)
+    run = (0.5 * (side + after) * (side - after) / beside + run_out(xp, after, level)) / side
     dx, dy = w.vx * run, w.vy * run
     down = -run_out(xp, -w.wz, fall)
     dz = xp.where(w.vz > 0.0, run_out(xp, xp.maximum(w.vz, 0.0), rise), down)

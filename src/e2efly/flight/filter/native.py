@@ -32,7 +32,8 @@ SOLIDS = 8
 """The compiled formula knows so many sides of solids. With more of them near, Python computes."""
 FAR = Plane(0.0, 0.0, 0.0, 1e9, "")
 """A side that no manoeuvre reaches."""
-COMPILER = "cc"
+COMPILER, LONGEST = "cc", 60.0
+"""The C compiler, and how long it may take, s."""
 OPTIONS = ("-O1", "-ffp-contract=off", "-shared", "-fPIC")
 """No product and sum become one operation, so that the results are Python's to the last bit."""
 
@@ -55,11 +56,20 @@ class Symbol:
         """A number with a name in C."""
         self.function, self.name = function, name
 
+    def __bool__(self) -> bool:
+        """A branch would be taken once and for all.
+
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError("a condition on a symbol; accepted: the function `where`")
+
     __add__, __radd__ = _operation("{} + {}"), _operation("{1} + {0}")
     __sub__, __rsub__ = _operation("{} - {}"), _operation("{1} - {0}")
     __mul__, __rmul__ = _operation("{} * {}"), _operation("{1} * {0}")
     __truediv__, __rtruediv__ = _operation("{} / {}"), _operation("{1} / {0}")
-    __lt__, __gt__, __ge__ = _operation("{} < {}"), _operation("{} > {}"), _operation("{} >= {}")
+    __lt__, __gt__ = _operation("{} < {}"), _operation("{} > {}")
+    __le__, __ge__ = _operation("{} <= {}"), _operation("{} >= {}")
     __and__, __neg__, __abs__ = _operation("{} && {}"), _operation("-{}"), _operation("fabs({})")
 
 
@@ -144,10 +154,10 @@ def _four(take: Callable[[], Any]) -> tuple[Any, Any, Any, Any]:
 
 
 class Native:
-    """The compiled formulas of a vehicle in a fence."""
+    """The compiled formulas of a vehicle in a fence. Only for one thread at a time."""
 
     def __init__(self, b: Backup, limits: MarginLimits) -> None:
-        """Compile them, in about a second.
+        """Compile them, in about two seconds.
 
         Raises:
             OSError: if there is no C compiler, or it fails. It tells what the compiler says.
@@ -158,10 +168,19 @@ class Native:
             code, made = Path(folder, "filter.c"), Path(folder, "filter.so")
             code.write_text(source(b, limits), encoding="utf-8")
             command = [COMPILER, *OPTIONS, "-o", str(made), str(code), "-lm"]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            try:
+                done = subprocess.run(
+                    command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=LONGEST
+                )
+            except subprocess.TimeoutExpired:
+                raise OSError(f"{COMPILER} takes longer than {LONGEST:g} s") from None
             if done.returncode:
                 raise OSError(f"{COMPILER} ended with {done.returncode}: {done.stderr.strip()[-500:]}")
-            self._library = ctypes.CDLL(str(made))
+            library = ctypes.CDLL(str(made))
+        numbers = ctypes.POINTER(ctypes.c_double)
+        library.forecast.argtypes, library.forecast.restype = (numbers, numbers, ctypes.c_void_p, ctypes.c_long), None
+        library.judge.argtypes, library.judge.restype = (numbers, numbers), None
+        self._library = library
         self._motion = (ctypes.c_double * MOTION)()
         self._in = (ctypes.c_double * (MOTION + AIR + COMMAND + 1 + SOLIDS * PLANE))()
         self._out = (ctypes.c_double * (COMMAND + 3))()
@@ -175,9 +194,7 @@ class Native:
             )
         self._motion[:] = m
         push = (ctypes.c_double * AIR)(*air)
-        self._library.forecast(
-            self._motion, push, ctypes.c_void_p(rows.buffer_info()[0]), ctypes.c_long(len(stretches))
-        )
+        self._library.forecast(self._motion, push, rows.buffer_info()[0], len(stretches))
         return ForecastMotion(*self._motion)
 
     def judge(

@@ -51,7 +51,7 @@ def best_heading(
     commanded, straight = (speed[:, None, None] * _along(angle) for angle in (heading, bearing[:, None]))
     tree_x, tree_y = (trees.centre[:, None, :, i] for i in range(2))
     reach = jnp.where(trees.active, trees.size[..., 0], -jnp.inf)[:, None] + radius
-    most, lag = flier.most[:, None, None], flier.lag[:, None, None]
+    most, lag = flier.acceleration_max[:, None, None], flier.lag[:, None, None]
     kept = jnp.exp(-STEP / lag)
     kept_mean = (1 - kept) * lag / STEP
 
@@ -69,7 +69,7 @@ def best_heading(
         free = jnp.where(gap < TOUCH, jnp.minimum(free, time), free)
         return (place, moving, pushed, nearness, free), None
 
-    begins = (flier.position[:, :2], flier.velocity[:, :2], flier.pushed)
+    begins = (flier.position[:, :2], flier.velocity[:, :2], flier.acceleration)
     spread = (jnp.broadcast_to(x[:, None], commanded.shape) for x in begins)
     nothing, end = jnp.zeros_like(heading), STEPS * STEP
     times = STEP * jnp.arange(STEPS, dtype=jnp.float32)
