@@ -25,7 +25,7 @@ TILT_MARGIN, LEAN_MARGIN, LEAST_TILT = 0.32, 0.36, 0.1
 """Margins below the largest tilt, rad. The first is the margin with which the tilt limit is kept. The second is the
 margin of the manoeuvre itself, because a rate loop may overshoot its turns. The third is the smallest tilt that must
 remain."""
-COUNTED = (0.7, 0.55)
+COUNTED = (0.85, 0.55)
 """Shares of the commanded deceleration that are assumed, sideways and for a fall. They cover the time until a loss of
 thrust is noticed."""
 DIAGONAL = 1.4 / THRUST_SHARE
