@@ -9,6 +9,7 @@ import pytest
 
 from e2efly.simulation.scenes.scene import Solids
 from e2efly.tasks.avoid.pilot import FAN, best_heading
+from e2efly.tasks.task import Flier
 
 RADIUS = 0.12
 
@@ -26,8 +27,10 @@ def heading(
     speed: float = 5.0,
     side: float = math.inf,
 ) -> float:
-    given = (jnp.array([x]) for x in (place, velocity, bearing, speed))
-    return float(best_heading(trees, *given, RADIUS, side)[0])
+    place, velocity = (jnp.array([[*x, 0.0]]) for x in (place, velocity))
+    return float(
+        best_heading(trees, Flier.usual(place, velocity), jnp.array([bearing]), jnp.array([speed]), RADIUS, side)[0]
+    )
 
 
 def test_with_nothing_ahead_the_bearing_is_flown() -> None:
@@ -80,7 +83,13 @@ def test_a_vehicle_that_follows_it_passes_forests() -> None:
     rng, n, speed = np.random.default_rng(1), 60, 6.0
     places = np.concatenate([rng.uniform((3, -8, 3), (25, 8, 3), (n, 35, 3))])
     trees = Solids.of("cylinder", jnp.asarray(places), jnp.array([0.25, 3.0]), active=jnp.ones((n, 35), bool))
-    fly = jax.jit(lambda p, v: best_heading(trees, p, v, jnp.zeros(n), jnp.full(n, speed), RADIUS, 8.0))
+    level, ahead, commanded = jnp.zeros(n), jnp.zeros(n), jnp.full(n, speed)
+
+    @jax.jit
+    def fly(p: jax.Array, v: jax.Array) -> jax.Array:
+        flier = Flier.usual(*(jnp.column_stack([x, level]) for x in (p, v)))
+        return best_heading(trees, flier, ahead, commanded, RADIUS, 8.0)
+
     place, velocity, struck = np.zeros((n, 2)), np.tile([speed, 0.0], (n, 1)), np.zeros(n, bool)
     for _ in range(140):
         turn = np.asarray(fly(jnp.asarray(place), jnp.asarray(velocity)))
@@ -93,7 +102,8 @@ def test_a_vehicle_that_follows_it_passes_forests() -> None:
 
 def test_it_hands_no_gradient_on() -> None:
     def turn(y: jax.Array) -> jax.Array:
-        place = jnp.stack([jnp.zeros(()), y])[None]
-        return best_heading(trunks((4.0, 0.1)), place, jnp.ones((1, 2)), jnp.zeros(1), jnp.ones(1), RADIUS, 8.0)[0]
+        place = jnp.stack([jnp.zeros(()), y, jnp.zeros(())])[None]
+        flier = Flier.usual(place, jnp.ones((1, 3)))
+        return best_heading(trunks((4.0, 0.1)), flier, jnp.zeros(1), jnp.ones(1), RADIUS, 8.0)[0]
 
     assert jax.grad(turn)(jnp.float32(0.0)) == 0.0
