@@ -88,6 +88,8 @@ def test_a_branch_on_a_symbol_is_refused() -> None:
     a, b = function.inputs
     with pytest.raises(TypeError, match="`where`"):
         max(a, b)
+    with pytest.raises(TypeError, match="`where`"):
+        bool(a == b)
 
 
 def test_a_reading_of_the_odometry_s_own_time_counts() -> None:

@@ -22,7 +22,8 @@ from e2efly.flight.filter.forecast import (
     Residual,
     ResponseStep,
     Stretch,
-    advanced,
+    measured,
+    moved,
 )
 from e2efly.flight.filter.judgement import judged
 from e2efly.flight.filter.margins import MarginLimits
@@ -70,6 +71,8 @@ class Symbol:
     __truediv__, __rtruediv__ = _operation("{} / {}"), _operation("{1} / {0}")
     __lt__, __gt__ = _operation("{} < {}"), _operation("{} > {}")
     __le__, __ge__ = _operation("{} <= {}"), _operation("{} >= {}")
+    __eq__, __ne__ = _operation("{} == {}"), _operation("{} != {}")  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]
     __and__, __neg__, __abs__ = _operation("{} && {}"), _operation("-{}"), _operation("fabs({})")
 
 
@@ -121,9 +124,10 @@ def source(b: Backup, limits: MarginLimits) -> str:
     take = iter(p.inputs).__next__
     m, air, command = ForecastMotion(*_some(take, MOTION)), Residual(*_four(take)), ForecastCommand(*_four(take))
     step = ResponseStep(take(), _four(take), _four(take), take(), take())
-    told, reading = take(), GyroReading(*_some(take, READ))
-    plain, read = (advanced(p, b.response, m, air, Stretch(command, step, of)) for of in (None, reading))
-    advance = p.written(p.where(told, x, y) for x, y in zip(read, plain, strict=True))
+    has_reading, reading = take(), GyroReading(*_some(take, READ))
+    plain = moved(p, b.response, m, command, air, step)
+    read = measured(p, plain, reading)
+    advance = p.written(p.where(has_reading, x, y) for x, y in zip(read, plain, strict=True))
     p = TracedFunction("judge", MOTION + AIR + COMMAND + 1 + SOLIDS * PLANE)
     take = iter(p.inputs).__next__
     m, air, wanted = ForecastMotion(*_some(take, MOTION)), Residual(*_four(take)), ForecastCommand(*_four(take))
