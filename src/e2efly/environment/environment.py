@@ -247,6 +247,7 @@ class Env:
             disturbance=self.disturbance and _times(self.disturbance, strength),
             estimate=self.estimate and _times(self.estimate, strength),
             link=self.link and _times(self.link, strength),
+            noise=self.noise and _times(self.noise, strength),
         )
 
     @property

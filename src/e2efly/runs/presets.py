@@ -14,6 +14,7 @@ from e2efly.config import (
     EnvConfig,
     EstimateConfig,
     LinkConfig,
+    NoiseConfig,
     RewardConfig,
     TaskConfig,
     TrainConfig,
@@ -50,6 +51,7 @@ OTHERS = EnvConfig(
         hold=4.0,
     ),
     link=LinkConfig(dropped=0.1, silence=0.2),
+    noise=NoiseConfig(position=0.01, velocity=0.05, attitude=0.005, body_rate=0.02),
 )  # fmt: skip
 """The vehicles of the preset `robust`, the air, the state estimate and the link."""
 BY_SIGHT = dataclasses.replace(
@@ -58,6 +60,7 @@ BY_SIGHT = dataclasses.replace(
     disturbance=dataclasses.replace(OTHERS.disturbance, gust=1.0, ceiling=0.0),
     estimate=EstimateConfig(),
     link=LinkConfig(),
+    noise=NoiseConfig(),
 )
 """The same for policies that see: with exact poses, as the policies of the zoo have learned."""
 AROUND = EnvConfig(
