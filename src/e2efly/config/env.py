@@ -47,11 +47,14 @@ class DisturbanceConfig:
     ceiling: float = number(0.0, high=0.9, added=True)
     """Largest share of its highest thrust that a rotor does not reach. Each rotor of an episode has its own ceiling.
     Commands below it are not affected."""
+    push: float = number(0.0, high=0.9, added=True)
+    """Largest force from outside at the centre of mass, relative to the vehicle's weight. It is constant in an episode,
+    in a random horizontal direction."""
 
     @property
     def weakest(self) -> float:
-        """The smallest share of the nominal thrust with which an episode can end."""
-        return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag) * (1 - self.ceiling)
+        """The smallest share of the nominal thrust with which an episode can end, relative to what a hover needs."""
+        return (1 - self.thrust) * (1 - self.rotor) * (1 - self.sag) * (1 - self.ceiling) / math.hypot(1, self.push)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Effects that a vehicle file does not include: gusts, uneven and weak rotors, a sagging battery, drifting poses."""
+"""Effects that a vehicle file does not include: gusts, pushes, uneven and weak rotors, a sagging battery, drift."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from e2efly.config import DisturbanceConfig
 from e2efly.simulation.physics.body import rotor_speed_for
 from e2efly.tasks.task import uniform
+from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 jax.tree_util.register_dataclass(
@@ -38,12 +39,16 @@ class Disturbance:
     """Current error of the observed position, world, m."""
     ceiling: Float[Array | np.ndarray, "n 4"]
     """Highest thrust of each rotor relative to that of the thrust map at full speed. 1: no ceiling of its own."""
+    push: Float[Array | np.ndarray, "n 2"]
+    """Acceleration by a constant horizontal force from outside, world, m/s^2."""
 
     @staticmethod
     def none(n: int) -> "Disturbance":
         """No disturbance."""
         zero, zeros = jnp.zeros(n), jnp.zeros((n, 3))
-        return Disturbance(zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)))
+        return Disturbance(
+            zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)), zeros[:, :2]
+        )
 
     def share(self, progress: Float[Array, " n"]) -> Float[Array, "n 4"]:
         """Thrust of each rotor relative to that of the thrust map, after this share of the episode."""
@@ -74,6 +79,7 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
     strength = jax.random.uniform(strength_key, (3, n))
     unit = uniform(rotor_key, n, 5)
     gust_speed = config.gust * strength[0]
+    pushed, way = jax.random.uniform(jax.random.fold_in(key, 4), (2, n)) * jnp.array([[GRAVITY], [2 * jnp.pi]])
     return Disturbance(
         gust_speed=gust_speed,
         gust_time=jnp.full(n, config.gust_time),
@@ -83,6 +89,7 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
         drift_rate=config.drift * strength[2],
         drift=jnp.zeros((n, 3)),
         ceiling=1 - config.ceiling * jax.random.uniform(jax.random.fold_in(key, 3), (n, 4)),
+        push=(config.push * pushed * jnp.stack([jnp.cos(way), jnp.sin(way)])).T,
     )
 
 

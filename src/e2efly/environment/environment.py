@@ -368,14 +368,16 @@ class Env:
         old, new, switch = latency.acting_commands(self.command(arrived), state.action_latency, period)
         before, physics = state.vehicle, self._physics(state.family)
         plant = dataclasses.replace(physics.flown, **state.plant)
-        wind, share, disturbed = state.wind, None, state.disturbance
+        wind, share, push, disturbed = state.wind, None, None, state.disturbance
         if disturbed is not None:
             gust = jnp.asarray(disturbed.gust)
             wind = gust if wind is None else wind + gust
-            share = disturbed.share(state.time / self.task.episode_s)
+            share, push = disturbed.share(state.time / self.task.episode_s), jnp.asarray(disturbed.push)
             plant = disturbed.weaker(plant, physics.nominal, physics.mixer.thrust_max)
             disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
-        after = step(physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share)
+        after = step(
+            physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share, push=push
+        )
 
         time = (jnp.round(state.time / period) + 1) * period  # whole periods: float32 sums drift
         late = self.is_over(time)

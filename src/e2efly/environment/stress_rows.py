@@ -196,6 +196,7 @@ class Draw:
                 drift_rate=strength("drift"),
                 drift=np.zeros((n, 3)),
                 ceiling=np.ones((n, 4)),
+                push=np.zeros((n, 2)),
             ),
             plain_mixer=zero + row.plain_mixer,
             noise=NoiseConfig(**noise),  # type: ignore[arg-type]

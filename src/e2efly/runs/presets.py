@@ -45,7 +45,9 @@ OTHERS = EnvConfig(
         "torque_ratio": 0.3, "rate_gain": 0.5,
     },
     wind=5.0,
-    disturbance=DisturbanceConfig(gust=1.5, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006, ceiling=0.1),
+    disturbance=DisturbanceConfig(
+        gust=1.5, thrust=0.25, rotor=0.1, sag=0.2, centre_of_mass=0.006, ceiling=0.1, push=0.1
+    ),
     estimate=EstimateConfig(
         position_lag=0.04, velocity_lag=0.08, attitude_lag=0.03, body_rate_lag=0.02, yaw=0.09, tilt=0.035, jump=0.1,
         hold=4.0,
@@ -57,7 +59,7 @@ OTHERS = EnvConfig(
 BY_SIGHT = dataclasses.replace(
     OTHERS,
     wind=3.0,
-    disturbance=dataclasses.replace(OTHERS.disturbance, gust=1.0, ceiling=0.0),
+    disturbance=dataclasses.replace(OTHERS.disturbance, gust=1.0, ceiling=0.0, push=0.0),
     estimate=EstimateConfig(),
     link=LinkConfig(),
     noise=NoiseConfig(),

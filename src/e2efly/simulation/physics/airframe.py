@@ -92,12 +92,14 @@ class Airframe:
     """Centre of mass relative to the point where the drag acts, body, m."""
     ceiling: Rotors | None = None
     """Highest speed that each rotor reaches, rad/s."""
+    push: tuple[Array, Array] | None = None
+    """Acceleration by a force from outside, world, x and y, m/s^2."""
 
     @staticmethod
-    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None) -> "Airframe":
+    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None, push: Array | None = None) -> "Airframe":
         """The plant of a vehicle, any field of which may be batched.
 
-        Sub-steps take `dt` seconds, and `rotor_share` is (*n, 4).
+        Sub-steps take `dt` seconds, `rotor_share` is (*n, 4), and `push` (*n, 2).
         """
         v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
@@ -133,6 +135,7 @@ class Airframe:
             mobility_products=mobility_products,
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),
             ceiling=None if v.rotor_speed_ceiling is None else split4(v.rotor_speed_ceiling),
+            push=None if push is None else (push[..., 0], push[..., 1]),
         )
 
 

@@ -82,7 +82,10 @@ def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
 def acceleration(plant: Airframe, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
     """Acceleration of the centre of mass, world, m/s^2, from the drag, body, N, and the collective thrust, N."""
     a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
-    return Vec3(a.x, a.y, a.z - GRAVITY)
+    if plant.push is None:
+        return Vec3(a.x, a.y, a.z - GRAVITY)
+    x, y = plant.push
+    return Vec3(a.x + x, a.y + y, a.z - GRAVITY)
 
 
 def angular_acceleration(plant: Airframe, body_rate: Vec3, torque: Vec3) -> Vec3:

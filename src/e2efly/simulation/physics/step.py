@@ -121,6 +121,7 @@ def step(
     switch_time: Float[Array, "*n"] | None = None,
     wind: Float[Array, "*n 3"] | None = None,
     rotor_share: Float[Array, "*n 4"] | None = None,
+    push: Float[Array, "*n 2"] | None = None,
 ) -> State:
     """Advance the state by one control period.
 
@@ -136,12 +137,13 @@ def step(
             differentiable with respect to the latency.
         wind: velocity of the air in the world, m/s.
         rotor_share: thrust of each rotor divided by the thrust from the vehicle's thrust map. None: 1.
+        push: acceleration by a horizontal force from outside at the centre of mass, world, m/s^2. None: no such force.
     """
     mode = COMMAND_MODES[physics.command_mode]
     state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
-    plant = Airframe.of(vehicle, dt, rotor_share)
+    plant = Airframe.of(vehicle, dt, rotor_share, push)
     controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
     after = split4(command)
