@@ -1,4 +1,4 @@
-"""What a vehicle file does not know: gusts, uneven rotors, sag, an offset centre of mass, drifting poses."""
+"""What a vehicle file does not know: gusts, pushes, uneven rotors, sag, an offset centre of mass, drifting poses."""
 
 from functools import partial
 from typing import Any
@@ -17,7 +17,7 @@ from e2efly.vehicles.loading import load_vehicle
 from tests.gradients import central, reverse
 
 STILL = HoverConfig(position=0.0, velocity=0.0, tilt=0.0, body_rate=0.0)
-ACTS = ("gust", "rotor_share", "sag", "drift")
+ACTS = ("gust", "rotor_share", "sag", "drift", "push")
 """What acts in a flight, through which gradients go."""
 step = jax.jit(partial(Env.step, restart=False))
 
@@ -45,11 +45,11 @@ def test_nothing_is_drawn_where_nothing_is_asked_for() -> None:
 
 
 def test_each_episode_draws_within_what_is_asked_for() -> None:
-    config = DisturbanceConfig(gust=2.0, rotor=0.1, sag=0.2, drift=0.05, ceiling=0.25)
+    config = DisturbanceConfig(gust=2.0, rotor=0.1, sag=0.2, drift=0.05, ceiling=0.25, push=0.1)
     d = draw(config, random_key(0), 20_000)
     for drawn, low, high in (
         (d.gust_speed, 0, 2.0), (d.rotor_share, 0.9, 1.1), (d.sag, 0, 0.2), (d.drift_rate, 0, 0.05),
-        (d.ceiling, 0.75, 1.0),
+        (d.ceiling, 0.75, 1.0), (jnp.linalg.norm(d.push, axis=1) / GRAVITY, 0, 0.1), (d.push / GRAVITY, -0.1, 0.1),
     ):  # fmt: skip
         assert low <= float(drawn.min()) < low + 0.02 * (high - low)
         assert high - 0.02 * (high - low) < float(drawn.max()) <= high + 1e-6
@@ -105,6 +105,16 @@ def test_a_sagging_battery_lets_the_vehicle_sink_more_and_more() -> None:
     lost = np.asarray(state.disturbance.sag) / float(env.task.episode_s)  # per second
     fallen = np.asarray(state.vehicle.position)[:, 2] - STILL.target[2]
     np.testing.assert_allclose(fallen, -GRAVITY * lost * seconds**3 / 6, rtol=0.06)
+
+
+def test_a_push_accelerates_a_level_vehicle_along_the_ground() -> None:
+    """A force of p times the weight gives p g, less the little drag of a second."""
+    state, seconds = flown(disturbed(push=0.1), 30), 1.0
+    assert state.disturbance is not None
+    moved = np.asarray(state.vehicle.position) - np.asarray(STILL.target)
+    push = np.asarray(state.disturbance.push)
+    np.testing.assert_allclose(moved[:, :2], push * seconds**2 / 2, rtol=0.03)
+    np.testing.assert_allclose(moved[:, 2], 0.0, atol=1e-3)
 
 
 def test_an_offset_centre_of_mass_and_a_weak_rotor_turn_the_vehicle() -> None:

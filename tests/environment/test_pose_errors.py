@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import EnvConfig, EstimateConfig, LinkConfig, RewardConfig
+from e2efly.config import EnvConfig, EstimateConfig, LinkConfig, NoiseConfig, RewardConfig
 from e2efly.environment import Env, random_key
 from e2efly.environment.pose_errors import PoseErrors, draw
 from e2efly.simulation.physics import State
@@ -162,3 +162,6 @@ def test_an_undisturbed_environment_has_none_of_it() -> None:
     assert env.is_disturbed and not env.undisturbed().is_disturbed
     half = env.eased(0.5)
     assert half.estimate == EstimateConfig(velocity_lag=0.05, hold=1.0) and half.link == LinkConfig(dropped=0.15)
+    noisy = made(estimate=EstimateConfig(velocity_lag=0.1), noise=NoiseConfig(position=0.01, velocity=0.2))
+    assert noisy.eased(0.5).noise == NoiseConfig(position=0.005, velocity=0.1)
+    assert noisy.undisturbed().noise == NoiseConfig()

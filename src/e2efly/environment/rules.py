@@ -56,6 +56,6 @@ def check(
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
             f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}: the weakest vehicle of these "
-            f"cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that leave at "
-            "least 1"
+            f"cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that "
+            "leave at least 1"
         )
