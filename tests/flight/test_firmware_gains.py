@@ -78,5 +78,5 @@ def test_gains_stay_within_what_the_firmware_takes() -> None:
 def test_the_lines_name_the_settings_of_each_release() -> None:
     gains = gains_of(load_vehicle("crazyflie"))
     lines = {release.name: gain_lines(gains, release) for release in RELEASES}
-    assert {"set p_roll=6", "set anti_gravity_gain=0", "set motor_idle=1311", "set d_max_yaw=0"} <= set(lines["4.6"])
+    assert {"set p_roll=10", "set anti_gravity_gain=0", "set motor_idle=1311", "set d_max_yaw=0"} <= set(lines["4.6"])
     assert {"set dshot_idle_value=1311", "set min_throttle=1131", "set d_min_roll=0"} <= set(lines["4.5"])

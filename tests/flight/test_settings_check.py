@@ -221,8 +221,8 @@ def test_a_rate_loop_unlike_the_vehicle_files_is_shown_with_what_to_set_and_forb
     assert rows_of(info)["P, I, D of roll"].told  # recorded with the gains of this vehicle
     light = rows_of(info, load_vehicle("crazyflie"))["P, I, D of roll"]
     assert (light.value, light.told) == ("16, 3, 5: rate_gain about 38 1/s", False)
-    assert light.needed == "6, 1, 2, by the vehicle file's rate_gain 14 1/s"
-    assert light.mend == ("set p_roll=6", "set i_roll=1", "set d_roll=2", "set d_max_roll=0")
+    assert light.needed == "10, 2, 3, by the vehicle file's rate_gain 24 1/s"
+    assert light.mend == ("set p_roll=10", "set i_roll=2", "set d_roll=3", "set d_max_roll=0")
     usual = rows_of(info)["anti_gravity_gain"]
     assert (usual.value, usual.told, usual.mend) == ("80", False, ("set anti_gravity_gain=0",))
     idle = rows_of(info)["idle of the motors"]
