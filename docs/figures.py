@@ -58,6 +58,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
+    "firmware_vehicles": "Every vehicle's policies through real Betaflight firmware",
     "room_flights": "The paper's six tasks through real Betaflight firmware, in a room of 6x6 m",
     "controllers": "Hover controllers, and where learning pays",
     "filter": "The filter of `fly --guard filter`: flights against it, and what it costs",
@@ -83,8 +84,8 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "room_flights", "controllers", "filter", "plants_by_sight", "image_faults", "hil_rehearsal", "hil_room",
-            "fault_campaign", "onboard", "c_export", "race_speed",
+            "firmware_vehicles", "room_flights", "controllers", "filter", "plants_by_sight", "image_faults",
+            "hil_rehearsal", "hil_room", "fault_campaign", "onboard", "c_export", "race_speed",
         ),
         ZOO,
     ),
@@ -213,6 +214,10 @@ The fence is 5.6 x 5.6 x 2.7 m, 0.2 m before the walls; it would end a policy's 
 leaves it. *Flown space*: the box of all true positions of the five flights, from take-off to landing. The races
 fly three laps of `room_6`, and the fastest is told the highest of 8, 7, 6, 5 and 4 m/s at which all five
 flights succeed. The others fly what `e2efly fly` flies without further options.""",
+    "firmware_vehicles": """
+Five whole flights each: take-off, the task, landing, nobody helping. *Starts*: success in 20 starts of `e2efly validate
+--plant betaflight`, in the simulator and behind the firmware. The firmware has the gains that each vehicle's file asks
+for. The last column names what gave a flight another mode than its mission.""",
     "firmware_flights": """
 The zoo's policies of VIS-R, as they ship, in all nine tasks. Success is the task's own verdict,
 by the code that judges training. All policies are by the preset `robust`. What the last three see is
