@@ -224,6 +224,8 @@ CURRICULUM = Experiment(
     ],
     """
 PPO with its curriculum (no obstacles, few, all) and with `--no-curriculum`, in equal steps. A case says something only
-if one of the two flies the task at the end (90 %).""",
+if one of the two flies the task at the end (90 %). By the preset `authors` neither finishes a lap of the S-shaped
+track; of the 3D circle and the J-shaped track the one with a curriculum flies 86 and 51 %, the one without 89 and
+82 %.""",
     seeds=3,
 )
