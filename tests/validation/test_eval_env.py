@@ -23,16 +23,16 @@ from e2efly.validation.starts import draw_starts
 
 @pytest.mark.whole
 def test_what_is_asked_for_flies_and_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A wind of 12 m/s carries the hover away; the report says so, and the terminal."""
+    """A wind of 40 m/s carries the hover away; the report says so, and the terminal."""
     report = tmp_path / "report.json"
-    asked = ["eval", "hover", "--episodes", "20", "--env.wind", "12", "--env.randomize", "mass", "0.2"]
+    asked = ["eval", "hover", "--episodes", "20", "--env.wind", "40", "--env.randomize", "mass", "0.2"]
     assert run([*asked, "--json", str(report), "--plots", str(tmp_path)]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "Flown under env.randomize {'mass': 0.2} (not {}), env.wind 12.0 (not 0.0)." in told
+    assert "Flown under env.randomize {'mass': 0.2} (not {}), env.wind 40.0 (not 0.0)." in told
     said = json.loads(report.read_text())
-    assert said["changed"] == {"env.randomize": {"mass": 0.2}, "env.wind": 12.0}
-    assert (said["env"]["wind"], said["env"]["randomize"]) == (12.0, {"mass": 0.2})
-    again = e2efly.evaluate("hover", 20, env={"wind": 12.0, "randomize": {"mass": 0.2}}).flown["hover"]
+    assert said["changed"] == {"env.randomize": {"mass": 0.2}, "env.wind": 40.0}
+    assert (said["env"]["wind"], said["env"]["randomize"]) == (40.0, {"mass": 0.2})
+    again = e2efly.evaluate("hover", 20, env={"wind": 40.0, "randomize": {"mass": 0.2}}).flown["hover"]
     still = e2efly.evaluate("hover", 20)
     assert still.as_json()["changed"] == {}
     windy = said["criteria"]["hover"]["final_error_m"]
