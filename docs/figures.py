@@ -215,7 +215,7 @@ leaves it. *Flown space*: the box of all true positions of the five flights, fro
 fly three laps of `room_6`, and the fastest is told the highest of 8, 7, 6, 5 and 4 m/s at which all five
 flights succeed. The others fly what `e2efly fly` flies without further options.""",
     "firmware_vehicles": """
-Five whole flights each: take-off, the task, landing, nobody helping. *Starts*: success in 20 starts of `e2efly validate
+Five to ten whole flights each: take-off, the task, landing, nobody helping. *Starts*: success in 20 of `e2efly validate
 --plant betaflight`, in the simulator and behind the firmware. The firmware has the gains that each vehicle's file asks
 for. The last column names what gave a flight another mode than its mission.""",
     "firmware_flights": """
