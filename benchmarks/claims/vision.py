@@ -223,10 +223,10 @@ RACING = Experiment(
 Every world has different obstacles. Gates are up to 0.3 m and 0.2 rad away from their places in the track's file. The
 commanded speeds are 4 to 12 m/s. A lap with a collision is not a success. *Ours* is PPO's preset `nominal`, with the
 paper's steps or with its own 8 M. The policies by the preset `authors` were stopped by the clock: one core flies
-9,000 to 13,000 steps per second, so that 1e8 steps take two to three hours. The success of those of one track changes by
-several points from one evaluation to the next: on the S-shaped track it lies between 80 and 92 % after 13 M steps, on the J-shaped
-track between 62 and 89 %. More steps help slowly: on the 3D circle, 90 % were reached after 8 M steps, and 96 % after
-56 M. One policy for the three tracks in 25 M steps is worse on each than one that knows its track alone, and
-finishes none of 1000 laps of the S-shaped track.""",
+9,000 to 13,000 steps per second, so that 1e8 steps take two to three hours. The success of those of one track changes
+by several points from one evaluation to the next: on the S-shaped track it lies between 80 and 92 % after 13 M steps,
+on the J-shaped track between 62 and 89 %. More steps help slowly: on the 3D circle, 90 % were reached after 8 M steps,
+and 96 % after 56 M. One policy for the three tracks in 25 M steps is worse on each than one that knows its track alone,
+and finishes none of 1000 laps of the S-shaped track.""",
     seeds=3,
 )
