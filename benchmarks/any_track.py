@@ -29,7 +29,7 @@ import jax  # noqa: E402
 import numpy as np  # noqa: E402
 
 from e2efly.courses.gates import Tracks  # noqa: E402
-from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, OPENING, random_tracks  # noqa: E402
+from e2efly.courses.random_tracks import RACING, random_tracks  # noqa: E402
 from e2efly.courses.tracks import RaceTrack, track_names  # noqa: E402
 from e2efly.environment import UNSEEN, Env, random_key  # noqa: E402
 from e2efly.environment.episodes import Act, Episodes, run_episodes, run_stepwise, wilson  # noqa: E402
@@ -76,18 +76,18 @@ def elsewhere(rng: np.random.Generator) -> RaceTrack:
     to = np.arctan2(ways[:, 1], ways[:, 0])
     onward = np.append(to[1:], to[-1])
     yaw = to + np.angle(np.exp(1j * (onward - to))) / 2 + rng.uniform(-0.3, 0.3, count)
-    opening = np.tile(rng.uniform(*OPENING, (count, 1)), 2)
+    opening = np.tile(rng.uniform(*RACING.opening, (count, 1)), 2)
     return RaceTrack("elsewhere", False, np.array(places[0]), float(to[0]), np.array(places[1:]), yaw, opening)
 
 
 def drawn(n: int, seed: int) -> Tracks:
     """Tracks of the package's sampler."""
-    return random_tracks(np.random.default_rng(seed).random((n, CANDIDATES, NUMBERS), np.float32))
+    return random_tracks(np.random.default_rng(seed).random((n, *RACING.numbers()), np.float32))
 
 
 def one(tracks: Tracks, world: int) -> Tracks:
     """One of many, with room for as many gates as all."""
-    return Tracks.of(tracks.track(world), MOST)
+    return Tracks.of(tracks.track(world), RACING.most)
 
 
 def on(env: Env, track: Tracks) -> Env:
@@ -218,7 +218,7 @@ def flights(policy: str) -> list[dict[str, Any]]:
     (suite,) = single.task.criteria().values()
     env, rng = single.environment(suite), np.random.default_rng(0)
     fly = flier(act_of(single.policy), FEW, env.episode_steps)
-    each = [fly(on(env, Tracks.of(elsewhere(rng), MOST)), random_key(i, UNSEEN)) for i in range(100)]
+    each = [fly(on(env, Tracks.of(elsewhere(rng), RACING.most)), random_key(i, UNSEEN)) for i in range(100)]
     rows.append(told("of another sampler", jax.tree.map(lambda *x: np.concatenate(x), *each), len(each)))
     print(rows[-1], flush=True)
     return rows

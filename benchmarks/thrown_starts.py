@@ -18,9 +18,9 @@ prepare("cpu")
 
 import numpy as np  # noqa: E402
 
+from e2efly.control.vectors import rotate  # noqa: E402
 from e2efly.environment import Env, random_key  # noqa: E402
 from e2efly.runs import presets  # noqa: E402
-from e2efly.simulation.physics.rotation import rotate  # noqa: E402
 from e2efly.vehicles.gravity import GRAVITY  # noqa: E402
 from e2efly.vehicles.loading import load_vehicle  # noqa: E402
 

@@ -103,13 +103,20 @@ def configured(policy: Path) -> TrainConfig:
     return presets.begun(dataclasses.replace(from_json(read_json(file), str(file)), devices=None))
 
 
+def option(name: str, value: Any) -> str:
+    """A value as an option of the command line."""
+    if (name, value) == ("curriculum", ()):
+        return " --no-curriculum"
+    return f" --{name.replace('_', '-')} {' '.join(map(str, value)) if isinstance(value, tuple) else value}"
+
+
 def made_by(command: str, config: TrainConfig) -> str:
     """How a configuration is trained today: the command, with the options in which the preset differs by now. Where
     options cannot say it, how the two differ.
     """
     others = differing(config, recorded(command).config)
     now = ", ".join(f"{name} {today}" for name, (_, today) in others.items())
-    options = "".join(f" --{name.replace('_', '-')} {value}" for name, (value, _) in others.items())
+    options = "".join(option(name, value) for name, (value, _) in others.items())
     try:
         with redirect_stderr(StringIO()):
             same = recorded(command + options).config == config

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -12,15 +13,15 @@ from e2efly.config import TaskConfig
 from e2efly.config.domain import Domain, Extent, outside, track_domain, union
 from e2efly.courses.defaults import ROOMS
 from e2efly.courses.gates import Tracks
-from e2efly.courses.random_tracks import CANDIDATES, DOMAIN, NUMBERS, random_tracks
+from e2efly.courses.random_tracks import CLUTTERED, RACING, TrackStyle, random_tracks
 from e2efly.courses.tracks import RaceTrack, load_track, track_names
 from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Shape
 from e2efly.policy.loader import load_policy
-from e2efly.policy.zoo import FOLDER
+from e2efly.policy.zoo import FOLDER, config_file
 from e2efly.runs import presets
+from e2efly.runs.inputs import from_json
 from e2efly.tasks import TASKS
-from e2efly.tasks.race import ANY, RaceConfig
 from e2efly.tasks.race.any_world import displaced
 from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.race_clutter import RaceClutterConfig
@@ -68,19 +69,20 @@ def test_outside_names_quantity_value_and_range_and_leaves_room_for_placing() ->
     assert outside((Extent("gates", "1", 3, 12),), trained) == ("gates is 2; trained for 3 to 12",)
 
 
-def test_random_tracks_and_those_of_the_package_lie_in_their_domain() -> None:
-    tracks: Tracks = random_tracks(np.random.default_rng(5).random((400, CANDIDATES, NUMBERS)))
-    reasons = [outside(DOMAIN, track_domain(tracks.track(i))) for i in range(400)]
+@pytest.mark.parametrize("style", [RACING, CLUTTERED])
+def test_random_tracks_and_those_of_the_package_lie_in_their_domain(style: TrackStyle) -> None:
+    tracks: Tracks = random_tracks(np.random.default_rng(5).random((400, *style.numbers())), style)
+    reasons = [outside(style.domain, track_domain(tracks.track(i))) for i in range(400)]
     assert all("gate_distance" in reason for reason in sum(reasons, ()))  # of the few that are not clear
     assert sum(map(bool, reasons)) <= 8
     for name in set(track_names()) - set(ROOMS):  # those of rooms have shorter legs
-        assert outside(DOMAIN, track_domain(load_track(name))) == ()
+        assert style is CLUTTERED or outside(style.domain, track_domain(load_track(name))) == ()
 
 
 def test_displaced_gates_lie_in_the_domain_of_their_task() -> None:
     config = RaceClutterConfig()
     world = RaceClutter.of(config, Shape(0.1, 0.2), 0.02, 1)
-    drawn = displaced(jax.random.key(3), 100, world.given, config.gate_position, config.gate_yaw)
+    drawn = displaced(jax.random.key(3), 100, world.given, config.gate_position, config.gate_yaw, chance=world.chance)
     tracks = jax.tree.map(np.asarray, drawn)
     for i in range(100):
         assert outside(config.domain(), track_domain(tracks.track(i))) == ()
@@ -108,11 +110,9 @@ def test_what_every_task_is_judged_by_and_flies_lies_in_its_training(name: str) 
 
 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*/*.onnx")), ids=lambda file: f"{file.parent.name}/{file.stem}")
-def test_every_policy_of_the_zoo_declares_its_training(file: object) -> None:
-    contract = load_policy(file).contract  # type: ignore[arg-type]
-    any_track = contract.task == "race" and "gate_openings" in contract.slices
-    task = RaceConfig(track=ANY) if any_track else TASKS[contract.task].training()
-    assert contract.courses == task.domain()
+def test_every_policy_of_the_zoo_declares_its_training(file: Path) -> None:
+    config = from_json(json.loads(config_file(file).read_text()), str(file))
+    assert load_policy(file).contract.courses == config.task.domain()
 
 
 def narrow(path: object) -> str:
@@ -160,7 +160,7 @@ def test_an_evaluation_says_what_lies_outside(tmp_path: object) -> None:
 
 def test_a_contract_with_and_without_declaration() -> None:
     contract = load_policy("race_any").contract
-    assert Contract.from_json(contract.to_json()).courses == DOMAIN
+    assert Contract.from_json(contract.to_json()).courses == RACING.domain
     content = json.loads(contract.to_json())
     older = Contract.from_json(json.dumps({key: value for key, value in content.items() if key != "courses"}))
     assert older == dataclasses.replace(contract, courses=None)

@@ -4,10 +4,11 @@ import jax
 import numpy as np
 
 from e2efly.config import NetworkConfig, RewardConfig
+from e2efly.control.vectors import rotate
 from e2efly.environment import Env
 from e2efly.learning.networks import Actor, Features, init_mlp
 from e2efly.policy.observation import ATTITUDE, VELOCITY
-from e2efly.simulation.physics.rotation import from_euler, multiply, rotate
+from e2efly.simulation.physics.rotation import from_euler, multiply
 from e2efly.tasks.hover import HoverConfig
 
 

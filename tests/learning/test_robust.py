@@ -28,7 +28,7 @@ def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
         nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
         assert robust.network.recurrent > 0
         assert bool(nominal.network.recurrent) == bool(TASKS[task].cameras and task != "land_visual")
-        drawn = presets.BY_SIGHT if nominal.env.cameras else presets.OTHERS
+        drawn = presets.OTHERS
         assert dataclasses.replace(robust.env, cameras=()) == drawn
         for own, other in zip(nominal.env.cameras, robust.env.cameras, strict=True):
             assert steady(other) == own

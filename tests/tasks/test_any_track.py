@@ -14,7 +14,7 @@ from e2efly.commands.eval import parse as parse_eval
 from e2efly.commands.train import parse as parse_train
 from e2efly.config import NetworkConfig
 from e2efly.courses.gates import Tracks
-from e2efly.courses.random_tracks import CANDIDATES, CLEAR, FEWEST, LOWEST, MOST, NUMBERS, OPENING, random_tracks
+from e2efly.courses.random_tracks import CLEAR, CLUTTERED, FEWEST, LOWEST, RACING, TrackStyle, random_tracks
 from e2efly.courses.tracks import load_track, track_names
 from e2efly.environment import Env, random_key
 from e2efly.learning.networks import Actor, Weights
@@ -37,9 +37,9 @@ SHAPE = Shape(0.05, 0.12)
 ANY = presets.preset("race", "bptt", "any_track")
 
 
-def drawn(n: int, seed: int = 0) -> Tracks:
-    u = np.random.default_rng(seed).random((n, CANDIDATES, NUMBERS), np.float32)
-    return random_tracks(u)
+def drawn(n: int, seed: int = 0, style: TrackStyle = RACING) -> Tracks:
+    u = np.random.default_rng(seed).random((n, *style.numbers()), np.float32)
+    return random_tracks(u, style)
 
 
 def shift(track: Tracks, gate: int, by: float) -> np.ndarray:
@@ -56,7 +56,7 @@ def task(track: str = "any", laps: int = 1) -> AnyRace:
 
 
 def test_tracks_are_the_same_on_both_libraries() -> None:
-    u = np.random.default_rng(1).random((50, CANDIDATES, NUMBERS), np.float32)
+    u = np.random.default_rng(1).random((50, *RACING.numbers()), np.float32)
     ours, theirs = random_tracks(u), jax.jit(random_tracks)(jnp.asarray(u))
     assert isinstance(ours.gates.position, np.ndarray)
     np.testing.assert_array_equal(ours.count, theirs.count)
@@ -65,24 +65,30 @@ def test_tracks_are_the_same_on_both_libraries() -> None:
     np.testing.assert_allclose(ours.gates.half, theirs.gates.half, atol=1e-5)
 
 
-def test_tracks_are_as_they_are_described() -> None:
-    tracks = drawn(2000)
+@pytest.mark.parametrize("style", [RACING, CLUTTERED])
+def test_tracks_are_as_they_are_described(style: TrackStyle) -> None:
+    tracks = drawn(2000, style=style)
     count, g = tracks.count, tracks.gates
-    assert set(count) == set(range(FEWEST, MOST + 1))
-    assert 0.4 < tracks.closed.mean() < 0.6
-    there = np.arange(MOST) < count[:, None]
-    assert (2 * g.half).min() >= OPENING[0] - 1e-6
-    assert (2 * g.half).max() <= OPENING[1] + 1e-6
+    assert set(count) == set(range(FEWEST, style.most + 1))
+    assert 0.3 < tracks.closed.mean() < 0.6
+    there = np.arange(style.most) < count[:, None]
+    assert (2 * g.half).min() >= style.opening[0] - 1e-6
+    assert (2 * g.half).max() <= style.opening[1] + 1e-6
     gates = g.position[:, :-1]
     assert (gates[..., 2] - g.half[..., 1])[there].min() >= LOWEST - 1e-4
-    assert gates[there][:, 2].max() <= 8.0
+    assert gates[there][:, 2].max() <= style.top[1]
     assert gates[~there][:, 2].max() < -100
     assert g.start[:, 2].min() >= 0.8 - 1e-6
     # every manoeuvre is there: turns of up to half a circle, gates above each other, climbs
     yaw = np.arctan2(g.sin, g.cos)
-    turn = np.abs(np.angle(np.exp(1j * np.diff(yaw, axis=1))))[there[:, 1:]]
+    turns = np.abs(np.angle(np.exp(1j * np.diff(yaw, axis=1))))
+    turn = turns[there[:, 1:]]
     step = np.diff(gates, axis=1)[there[:, 1:]]
     flat = np.linalg.norm(step[:, :2], axis=-1)
+    if style is CLUTTERED:
+        assert turns[there[:, 1:] & ~tracks.closed[:, None]].max() <= 2.1 + 1e-6
+        assert flat[~np.repeat(tracks.closed, count - 1)].min() > 0.7 * style.leg[0] - 1e-3
+        return
     assert turn.max() > 3.1
     stacked = (flat < 1.01) & (np.abs(step[:, 2]) > 1.2) & (turn > 2.7)
     assert 0.03 < stacked.mean() < 0.12
@@ -154,8 +160,8 @@ def test_what_ends_a_race_badly() -> None:
 
 
 def test_the_policy_is_shown_the_next_three_gates() -> None:
-    tracks = Tracks.of(load_track("s_shaped"), MOST)
-    closed = Tracks.of(load_track("four_gates"), MOST)
+    tracks = Tracks.of(load_track("s_shaped"), RACING.most)
+    closed = Tracks.of(load_track("four_gates"), RACING.most)
     goal = task("s_shaped")
     body = at_rest(jnp.asarray([[1.0, 2.0, 7.0]]))
     for made, passed, gates in ((tracks, 1, [1, 2, 3]), (tracks, 3, [3, 3, 3]), (closed, 7, [3, 0, 1])):

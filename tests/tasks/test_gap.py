@@ -9,10 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.control.vectors import rotate, unrotate
 from e2efly.environment import random_key
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import State
-from e2efly.simulation.physics.rotation import from_euler, multiply, rotate, unrotate
+from e2efly.simulation.physics.rotation import from_euler, multiply
 from e2efly.simulation.scenes.scene import WALL, clearance
 from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.gap.goal import GapMemory

@@ -128,9 +128,9 @@ def _cameras() -> Rows:
 
 def _rest() -> Rows:
     from e2efly.control import COMMAND_MODES
+    from e2efly.courses.random_tracks import ANY
     from e2efly.flight.pilot.hovering import HOVERS
     from e2efly.simulation.physics import INTEGRATORS
-    from e2efly.tasks.race import ANY
     from e2efly.validation.plants import PLANTS
 
     kinds: dict[str, Iterable[str]] = {

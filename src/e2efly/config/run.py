@@ -206,9 +206,9 @@ class TaskConfig:
     """Weights of the reward terms, if there is no `recipe`."""
     best: ClassVar[str] = "ppo"
     """The algorithm that learns the task best."""
-    precision: ClassVar[Literal["final_error", "mean_error", "duration", "pace"]] = "final_error"
-    """The measure that ranks policies with equal success; smaller is better. With `pace`, a success counts as one
-    divided by its duration."""
+    precision: ClassVar[str] = "final_error"
+    """The measure that ranks policies with equal success, smaller is better: final_error, mean_error, duration or pace.
+    With `pace`, a success counts as one divided by its duration."""
     smooth: ClassVar[Mapping[str, float] | None] = None
     """Rewards for methods that have both a gradient and a critic. None: PPO's rewards. For a critic, nothing follows a
     crash. If every step costs, as in BPTT's rewards, an early crash would be the best outcome. These rewards therefore

@@ -192,6 +192,16 @@ class Quat:
         return namespace(up).arccos(namespace(up).clip(up, -1.0, 1.0))
 
 
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Rotate vectors (..., 3) from body to world by quaternions (..., 4)."""
+    return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
+
+
+def unrotate(quaternion: Array, vector: Array) -> Array:
+    """Rotate vectors (..., 3) from world to body by quaternions (..., 4)."""
+    return Quat.of(quaternion).unrotate(Vec3.of(vector)).stack()
+
+
 def stack(*parts: Array) -> Array:
     """Stack components behind the batch axes, broadcast against each other."""
     xp = namespace(*parts)

@@ -23,9 +23,12 @@ Openings are 0.6 to 1.5 m wide and high, half of them square. A race starts 2.5 
 0.8 rad beside its axis and 1 m above or below, heading within 0.4 rad of it. Of `CANDIDATES` tracks, the first is used
 whose gates are at least `CLEAR` away from the straight lines between other gates. If there is none, the track that
 comes nearest to this is used.
+
+These are the numbers of `RACING`. Another `TrackStyle` has others, and may have straight pieces and turns alone.
 """
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,45 +36,94 @@ import numpy as np
 from e2efly.config.domain import FIRST, Domain, Extent
 from e2efly.courses.gates import BURIED, Gates, Tracks
 
-FEWEST, MOST = 3, 12
-"""Smallest and largest number of gates of a track."""
-LEG = (3.5, 18.0)
-"""Range of the distance from gate to gate, m. Each track has its own distance."""
-OPENING = (0.6, 1.5)
-"""Range of the width and height of an opening, m."""
+ANY = "any"
+"""The track name that gives a different track in every episode."""
+FEWEST = 3
+"""Smallest number of gates of a track."""
 CLEAR = 1.6
 """Smallest distance between a gate's centre and the straight line between two other gates, and between two gates, m."""
 CLOSED = 0.4
 """Share of the candidates that are closed. Of the tracks it is about a half, because more closed candidates are
 kept."""
+HAIRPINS = 0.68
+"""Pieces whose number is smaller are straight ones and turns."""
 CANDIDATES = 4
 """Number of candidates that are drawn for each track."""
 HEAD, EACH = 11, 8
-NUMBERS = HEAD + MOST * EACH
-"""Uniform numbers per candidate."""
+"""Uniform numbers per candidate, and per gate of a candidate."""
 FAR = 1e6
 """Squared distance of gates that do not count, m^2."""
 LOWEST = 0.3
 """Smallest height of the lower edge of an opening above the ground, m."""
-DOMAIN: Domain = (
-    Extent("gates", "1", FEWEST, MOST),
-    Extent("gate_width", "m", *OPENING),
-    Extent("gate_height", "m", *OPENING),
-    Extent("gate_altitude", "m", LOWEST + OPENING[0] / 2, 8.0 - OPENING[0] / 2),
-    Extent("gate_distance", "m", CLEAR, 50.0),
-    Extent("gate_rise", "m", -6.7, 6.7),
-    Extent("gate_bearing", "rad", -2.85, 2.85),
-    Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
-    Extent("start_distance", "m", 2.5, 6.1),
+
+
+@dataclass(frozen=True)
+class TrackStyle:
+    """What random tracks are like."""
+
+    most: int
+    """Largest number of gates."""
+    leg: tuple[float, float]
+    """Range of the distance from gate to gate, m. Each track has its own distance."""
+    opening: tuple[float, float]
+    """Range of the width and height of an opening, m."""
+    top: tuple[float, float]
+    """Range of the height of the track's top, m."""
+    pieces: float
+    """Pieces of open tracks have a number below this."""
+    domain: Domain
+    """The domain of a policy of such tracks. From `gate_distance` on, the ranges are those of some 100 000 tracks. Of a
+    thousand gates, one is nearer to the next one than `CLEAR`."""
+
+    def numbers(self, room: int = 0) -> tuple[int, int]:
+        """The shape of the uniform numbers for a track, in arrays for `room` gates, or for as many as it may have."""
+        return CANDIDATES, HEAD + EACH * max(room, self.most)
+
+
+RACING = TrackStyle(
+    most=12,
+    leg=(3.5, 18.0),
+    opening=(0.6, 1.5),
+    top=(4.0, 8.0),
+    pieces=1.0,
+    domain=(
+        Extent("gates", "1", FEWEST, 12),
+        Extent("gate_width", "m", 0.6, 1.5),
+        Extent("gate_height", "m", 0.6, 1.5),
+        Extent("gate_altitude", "m", LOWEST + 0.6 / 2, 8.0 - 0.6 / 2),
+        Extent("gate_distance", "m", CLEAR, 50.0),
+        Extent("gate_rise", "m", -6.7, 6.7),
+        Extent("gate_bearing", "rad", -2.85, 2.85),
+        Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
+        Extent("start_distance", "m", 2.5, 6.1),
+    ),
 )
-"""The domain of a policy of such tracks. The last of these ranges are those of 200 000 tracks. Of a thousand gates, one
-is nearer to the next one than `CLEAR`."""
+"""Tracks to race on as fast as one can."""
+CLUTTERED = TrackStyle(
+    most=6,
+    leg=(5.0, 12.0),
+    opening=(1.0, 1.0),
+    top=(2.5, 4.0),
+    pieces=HAIRPINS,
+    domain=(
+        Extent("gates", "1", FEWEST, 6),
+        Extent("gate_width", "m", 1.0, 1.0),
+        Extent("gate_height", "m", 1.0, 1.0),
+        Extent("gate_altitude", "m", LOWEST + 1.0 / 2, 4.0 - 1.0 / 2),
+        Extent("gate_distance", "m", CLEAR, 30.0),
+        Extent("gate_rise", "m", -2.7, 2.7),
+        Extent("gate_bearing", "rad", -2.9, 2.9),
+        Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
+        Extent("start_distance", "m", 2.5, 6.1),
+    ),
+)
+"""Tracks on which there is room for obstacles between the gates."""
 
 
-def random_tracks(u: Any) -> Tracks:
-    """Random tracks for n worlds. `u` is (n, CANDIDATES, NUMBERS), uniform in [0, 1)."""
+def random_tracks(u: Any, style: TrackStyle = RACING) -> Tracks:
+    """Random tracks for n worlds. `u` is (n, *style.numbers()), uniform in [0, 1)."""
     xp = u.__array_namespace__()
-    candidates = _candidates(u)
+    candidates = _candidates(u, style)
     best = xp.argmax(xp.minimum(_clearance(candidates), CLEAR), axis=1)
 
     def chosen(x: Any) -> Any:
@@ -82,24 +134,25 @@ def random_tracks(u: Any) -> Tracks:
     return Tracks(Gates(*parts), chosen(candidates.count), chosen(candidates.closed))
 
 
-def _candidates(u: Any) -> Tracks:
+def _candidates(u: Any, style: TrackStyle) -> Tracks:
     """All candidates, with the leading axes (n, CANDIDATES)."""
     xp = u.__array_namespace__()
     head = [u[..., i] for i in range(HEAD)]
-    each = u[..., HEAD:].reshape(*u.shape[:-1], MOST, EACH)
+    each = u[..., HEAD:].reshape(*u.shape[:-1], -1, EACH)
     kind, stretch, lie, bend, climb, steep, wide, high = (each[..., i] for i in range(EACH))
-    count = FEWEST + (head[0] * (MOST - FEWEST + 1)).astype("int32")
+    count = FEWEST + (head[0] * (style.most - FEWEST + 1)).astype("int32")
     closed = head[1] < CLOSED
-    leg = (LEG[0] * (LEG[1] / LEG[0]) ** head[2])[..., None]
-    width = _between(OPENING, wide)
-    height = xp.where(high < 0.5, width, _between(OPENING, 2 * high - 1))
+    shortest, longest = style.leg
+    leg = (shortest * (longest / shortest) ** head[2])[..., None]
+    width = _between(style.opening, wide)
+    height = xp.where(high < 0.5, width, _between(style.opening, 2 * high - 1))
     low = height / 2 + LOWEST
-    top = _between((4.0, 8.0), head[3])[..., None] - height / 2
-    chain = _chain(leg, kind, stretch, lie, bend, climb, steep)
+    top = _between(style.top, head[3])[..., None] - height / 2
+    chain = _chain(leg, style.pieces * kind, stretch, lie, bend, climb, steep)
     around = _around(leg, count[..., None], [x[..., None] for x in head[4:7]], stretch, lie, bend, climb)
     x, y, z, yaw = (xp.where(closed[..., None], b, a) for a, b in zip(chain, around, strict=True))
     z = _reflected(z + _between((1.0, 3.0), head[7])[..., None], low, top)
-    there = xp.arange(MOST) < count[..., None]
+    there = xp.arange(each.shape[-2]) < count[..., None]
     position = xp.stack([x, y, xp.where(there, z, BURIED)], axis=-1)
     cos, sin = xp.cos(yaw), xp.sin(yaw)
     away, beside = _between((2.5, 6.0), head[8]), 1.6 * (head[9] - 0.5)
@@ -129,10 +182,10 @@ def _reflected(z: Any, low: Any, high: Any) -> Any:
 
 
 def _chain(leg: Any, kind: Any, stretch: Any, lie: Any, bend: Any, climb: Any, steep: Any) -> tuple[Any, ...]:
-    """x, y, z and yaw of the gates of an open track, piece by piece, from numbers (..., MOST) for each."""
+    """x, y, z and yaw of the gates of an open track, piece by piece, from numbers (..., gates) for each."""
     xp = leg.__array_namespace__()
     side, bend = xp.where(bend < 0.5, -1.0, 1.0), (2 * bend) % 1
-    curve, hairpin, stacked = kind >= 0.30, kind >= 0.68, kind >= 0.84
+    curve, hairpin, stacked = kind >= 0.30, kind >= HAIRPINS, kind >= 0.84
     turn = xp.where(curve, side * _between((0.4, 2.1), bend), side * 0.35 * bend)
     turn = xp.where(hairpin, side * _between((2.2, math.pi), bend), turn)
     turn = xp.where(stacked, side * _between((math.pi - 0.4, math.pi), bend), turn)
@@ -158,7 +211,7 @@ def _around(leg: Any, count: Any, whole: list[Any], stretch: Any, lie: Any, bend
     shape, aspect, side = whole
     mirrored = xp.where(side < 0.5, -1.0, 1.0)
     radius, narrow = leg * count / (2 * math.pi), xp.sqrt(_between((1.0, 3.0), aspect))
-    angle = 2 * math.pi * (xp.arange(MOST) + 0.3 * (2 * stretch - 1)) / count
+    angle = 2 * math.pi * (xp.arange(stretch.shape[-1]) + 0.3 * (2 * stretch - 1)) / count
     cos, sin = xp.cos(angle), xp.sin(angle)
     eight = (shape < 0.4) & (count >= 6)
     a, b = radius * narrow, radius / narrow
@@ -173,7 +226,8 @@ def _around(leg: Any, count: Any, whole: list[Any], stretch: Any, lie: Any, bend
 
 def _clearance(tracks: Tracks) -> Any:
     """(n, CANDIDATES) smallest distance of a gate from a line between others, and between consecutive gates, m."""
-    g, lines, index = tracks.gates, np.arange(MOST + 1)[:, None], np.arange(MOST)
+    g, most = tracks.gates, tracks.gates.count
+    lines, index = np.arange(most + 1)[:, None], np.arange(most)
     xp, count = g.position.__array_namespace__(), tracks.count[..., None]
     homeward = tracks.closed[..., None] & (index == count - 1)  # the last line begins at this gate
     leads = xp.concatenate([index < count, tracks.closed[..., None]], axis=-1)
@@ -190,7 +244,7 @@ def _clearance(tracks: Tracks) -> Any:
         length = length + along * along
     share = xp.clip(product / xp.maximum(length, 1e-6)[..., None], 0.0, 1.0)
     gap = square - 2 * share * product + share * share * length[..., None]
-    own = (index == lines) | ((index == lines - 1) & (lines < MOST)) | ((lines == MOST) & (index == 0))
-    counts = leads[..., None] & (index < count)[..., None, :] & ~own & ~((lines == MOST) & homeward[..., None, :])
+    own = (index == lines) | ((index == lines - 1) & (lines < most)) | ((lines == most) & (index == 0))
+    counts = leads[..., None] & (index < count)[..., None, :] & ~own & ~((lines == most) & homeward[..., None, :])
     clear = xp.where(counts, gap, FAR).min(axis=(-1, -2))
     return xp.sqrt(xp.maximum(xp.minimum(clear, xp.where(leads, length, FAR).min(axis=-1)), 0.0))

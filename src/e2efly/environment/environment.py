@@ -30,6 +30,7 @@ from e2efly.config import (
 )
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
+from e2efly.control.vectors import unrotate
 from e2efly.environment import disturbance, expert, lost_commands, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
@@ -52,7 +53,6 @@ from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
-from e2efly.simulation.physics.rotation import unrotate
 from e2efly.simulation.scenes import scene as scenes
 from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
 from e2efly.simulation.scenes.scene import Scene

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.config import CameraConfig, NetworkConfig, check_fields
+from e2efly.control.vectors import unrotate
 from e2efly.policy.observation import Field
-from e2efly.simulation.physics.rotation import unrotate
 
 Layers = list[tuple[Array | np.ndarray, Array | np.ndarray]]
 """Weights (inputs, outputs) and biases of each layer."""

@@ -14,6 +14,7 @@ from typing import Any
 from e2efly.config import ALGORITHMS, TrainConfig
 from e2efly.config.numbers import ADDED
 from e2efly.config.reading import read
+from e2efly.courses.random_tracks import ANY
 from e2efly.courses.tracks import track_file
 from e2efly.runs.presets import preset
 from e2efly.tasks import TASKS
@@ -30,9 +31,9 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
         ValueError: for a vehicle or track that does not exist.
     """
     found = {"env.vehicle": vehicle_file(config.env.vehicle)}
-    if (track := getattr(config.task, "track", "")) and not config.task.own_worlds:
-        several = {f"task.track.{i}": name for i, name in enumerate(track)} if isinstance(track, tuple) else {}
-        found |= {field: track_file(name) for field, name in (several or {"task.track": track}).items()}
+    track = getattr(config.task, "track", ())
+    tracks = {"task.track": track} if isinstance(track, str) else {f"task.track.{i}": x for i, x in enumerate(track)}
+    found |= {field: track_file(name) for field, name in tracks.items() if name != ANY}
     if config.start_from is not None:
         found["start_from"] = Path(config.start_from)
     named = {"task.reference": getattr(config.task, "reference", "")}

@@ -56,15 +56,6 @@ OTHERS = EnvConfig(
     noise=NoiseConfig(position=0.01, velocity=0.05, attitude=0.005, body_rate=0.02),
 )  # fmt: skip
 """The vehicles of the preset `robust`, the air, the state estimate and the link."""
-BY_SIGHT = dataclasses.replace(
-    OTHERS,
-    wind=3.0,
-    disturbance=dataclasses.replace(OTHERS.disturbance, gust=1.0, ceiling=0.0, push=0.0),
-    estimate=EstimateConfig(),
-    link=LinkConfig(),
-    noise=NoiseConfig(),
-)
-"""The same for policies that see: with exact poses, as the policies of the zoo have learned."""
 AROUND = EnvConfig(
     randomize={posterior.IDENTIFIED: 1.0},
     wind=2.0,
@@ -211,7 +202,7 @@ def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainCo
         dataclasses.replace(c, latency=(c.latency[0], c.latency[1] + OLDER), **BESIDE_CAMERA)
         for c in config.env.cameras
     )
-    env = AROUND if name == IDENTIFIED else BY_SIGHT if cameras else OTHERS
+    env = AROUND if name == IDENTIFIED else OTHERS
     return given.into(dataclasses.replace(config, env=dataclasses.replace(env, cameras=cameras)))
 
 
@@ -232,7 +223,7 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
         ValueError: for a vehicle that does not exist.
     """
     env = dataclasses.replace(config.env, vehicle=vehicle)
-    robust = any((env.randomize, env.disturbance) == (of.randomize, of.disturbance) for of in (OTHERS, BY_SIGHT))
+    robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
     if robust and load_family(vehicle) is not None:
         given = config.task.family.get(config.algo.name)
         if given is None:

@@ -5,7 +5,7 @@ They use the library of their arrays, NumPy or JAX, so that flight and training 
 
 from typing import Any
 
-from e2efly.control.vectors import Array, Quat, Vec3, namespace
+from e2efly.control.vectors import Array, Quat, namespace
 from e2efly.policy.goal import Shape
 
 
@@ -32,13 +32,3 @@ def held_longer(held: Array, well: Array, period: float | Array) -> Array:
 def upright(body: Any, tilt: float | Array) -> Array:
     """Whether the vehicle is tilted by less than `tilt`, rad."""
     return Quat.of(body.quaternion).z_axis().z > namespace(body.quaternion).cos(tilt)
-
-
-def rotate(quaternion: Array, vector: Array) -> Array:
-    """Rotate vectors (..., 3) from body to world by quaternions (..., 4)."""
-    return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
-
-
-def unrotate(quaternion: Array, vector: Array) -> Array:
-    """Rotate vectors (..., 3) from world to body by quaternions (..., 4)."""
-    return Quat.of(quaternion).unrotate(Vec3.of(vector)).stack()

@@ -32,6 +32,9 @@ _ARM_OF_KILOGRAM = 0.12
 racers."""
 _ARM_SPREAD = 1.7
 """Largest factor on this arm. The smallest factor is one divided by it."""
+_COMMANDED = 6.0
+"""Largest collective thrust that a policy commands, divided by the weight, whatever more a vehicle has. With a wider
+range of commands, small ones would be less precise."""
 _RINGING = 4.0
 """Largest product of rate gain and motor lag that is drawn. It gives a damping ratio of 1 / (2 sqrt(4)) = 0.25."""
 _AIR = 1.225
@@ -197,7 +200,7 @@ class Family:
         # 0.5
         radius = arm * _between(size, (0.35, 0.68))
         full = _between(tip, (60.0, 180.0)) / radius
-        top = _between(strong, r.thrust_to_weight) * m * GRAVITY / 4
+        top = _log(xp, strong, r.thrust_to_weight) * m * GRAVITY / 4
         share = _between(curve, (0.1, 0.3))  # share of the thrust at full speed that grows linearly
         thrust_map = xp.stack([(1 - share) * top / full**2, share * top / full, 0 * top], axis=-1)
         time = _log(xp, lag, r.motor_time_constant)
@@ -258,7 +261,7 @@ class Family:
         r = self.ranges
         if command_mode == "ctbr":
             rates = [r.roll_rate_max[1], r.roll_rate_max[1], r.yaw_rate_max[1]]
-            return [0.0, *(-x for x in rates)], [r.thrust_to_weight[1] * GRAVITY, *rates]
+            return [0.0, *(-x for x in rates)], [min(r.thrust_to_weight[1], _COMMANDED) * GRAVITY, *rates]
         if command_mode == "rotor_share":
             return [0.0] * 4, [1.0] * 4
         raise ValueError(

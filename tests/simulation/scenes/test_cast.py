@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from e2efly.config import CameraConfig
+from e2efly.control.vectors import rotate
 from e2efly.courses.solids import SIZES
 from e2efly.environment import random_key
-from e2efly.simulation.physics.rotation import from_euler, multiply, rotate
+from e2efly.simulation.physics.rotation import from_euler, multiply
 from e2efly.simulation.scenes import camera, cast
 from e2efly.simulation.scenes.scene import GATE, GROUND, OBSTACLE, SKY, Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from e2efly.control.vectors import Quat, Vec3, stack
+from e2efly.control.vectors import Quat, rotate, stack
 
 Quaternion = Float[Array, "*n 4"]
 Vector = Float[Array, "*n 3"]
@@ -22,16 +22,6 @@ def conjugate(q: Quaternion) -> Quaternion:
 def normalize(q: Quaternion) -> Quaternion:
     """Scale to unit length."""
     return Quat.of(q).normalized().stack()
-
-
-def rotate(q: Quaternion, v: Vector) -> Vector:
-    """Body vector to world vector."""
-    return Quat.of(q).rotate(Vec3.of(v)).stack()
-
-
-def unrotate(q: Quaternion, v: Vector) -> Vector:
-    """World vector to body vector."""
-    return Quat.of(q).unrotate(Vec3.of(v)).stack()
 
 
 def to_matrix(q: Quaternion) -> Float[Array, "*n 3 3"]:

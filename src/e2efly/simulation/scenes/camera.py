@@ -13,8 +13,9 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import CameraConfig, check_fields
 from e2efly.config.names import unknown
+from e2efly.control.vectors import rotate
 from e2efly.courses.solids import CLASSES
-from e2efly.simulation.physics.rotation import from_euler, rotate, to_matrix
+from e2efly.simulation.physics.rotation import from_euler, to_matrix
 from e2efly.simulation.scenes import cast as solids
 from e2efly.simulation.scenes.cast import Light, Pattern, usual_light
 from e2efly.simulation.scenes.meshes import mesh_cast as meshes

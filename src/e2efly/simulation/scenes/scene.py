@@ -14,8 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from e2efly.control.vectors import unrotate
 from e2efly.courses.solids import CLASSES, USUAL_CLASS
-from e2efly.simulation.physics.rotation import from_euler, unrotate
+from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.shapes import FAR, ROOM, SHAPES
 
 SKY, GROUND, OBSTACLE, GATE, PAD, WALL = range(6)

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import ImuConfig
+from e2efly.control.vectors import unrotate
 from e2efly.simulation.physics import State
-from e2efly.simulation.physics.rotation import unrotate
 from e2efly.vehicles.gravity import GRAVITY
 
 jax.tree_util.register_dataclass(

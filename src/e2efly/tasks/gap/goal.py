@@ -16,12 +16,12 @@ import numpy as np
 
 from e2efly.config import number
 from e2efly.config.domain import Domain, extent
-from e2efly.control.vectors import Array, Quat, namespace
+from e2efly.control.vectors import Array, Quat, namespace, rotate, unrotate
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.gap import GapConfig
 from e2efly.tasks.route import Route, place
-from e2efly.tasks.verdicts import distance, offsets, rotate, unrotate
+from e2efly.tasks.verdicts import distance, offsets
 
 WALL_WIDTH = 3.0
 """Distance to which the wall extends around the opening, m."""

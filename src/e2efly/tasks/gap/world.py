@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from e2efly.control.vectors import rotate, unrotate
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
-from e2efly.simulation.physics.rotation import from_euler, rotate, unrotate
+from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import WALL, Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.gap import GapConfig

@@ -11,13 +11,13 @@ import numpy as np
 from e2efly.config import number
 from e2efly.config.domain import Domain, extent
 from e2efly.control.place import Place
-from e2efly.control.vectors import Array, Quat, Vec3, namespace
+from e2efly.control.vectors import Array, Quat, Vec3, namespace, unrotate
 from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.hover_aware import HoverAwareConfig
 from e2efly.tasks.route import Route, place
-from e2efly.tasks.verdicts import distance, held_longer, touches_ground, unrotate
+from e2efly.tasks.verdicts import distance, held_longer, touches_ground
 
 OUTSIDE = 10.0
 """Limit of pixel coordinates, in halves of the image. Points behind the camera also get this value."""

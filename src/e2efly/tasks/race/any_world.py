@@ -4,6 +4,7 @@ Racing on one of several given tracks, whose gates are displaced in every episod
 """
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,14 +16,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.courses.gates import Tracks
-from e2efly.courses.random_tracks import CANDIDATES, MOST, NUMBERS, random_tracks
+from e2efly.courses.random_tracks import ANY, RACING, TrackStyle, random_tracks
 from e2efly.courses.tracks import load_track
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.scene import Scene
-from e2efly.tasks.race import ANY
 from e2efly.tasks.race.any_goal import Ahead, AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.way import NextGates
 from e2efly.tasks.task import at_rest, into_ball, uniform
@@ -52,15 +52,13 @@ class AnyRace(AnyRaceGoal):
         if given is not None and config.laps > 1 and not given.closed:
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as track {given.name!r} is not closed")
         numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
-        return AnyRace(numbers, shape, None if given is None else Tracks.of(given, MOST))
+        return AnyRace(numbers, shape, None if given is None else Tracks.of(given, RACING.most))
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, AnyRaceMemory]:
         """At rest and level in a ball around the start of each vehicle's track, with the heading of the track."""
         track_key, state_key = jax.random.split(key)
         if self.given is None:
-            size = CANDIDATES * NUMBERS
-            u = jax.random.uniform(track_key, (n, size)).reshape(n, CANDIDATES, NUMBERS)
-            tracks = random_tracks(u)
+            tracks = drawn(track_key, n, RACING)
         else:
             tracks = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x), (n, *x.shape[1:])), self.given)
         g = tracks.gates
@@ -101,8 +99,16 @@ def begun(key: PRNGKeyArray, n: int, radius: Any, shape: Shape, place: Any, head
     return dataclasses.replace(at_rest(position), quaternion=from_euler(zero, zero, zero + heading))
 
 
-def several(names: tuple[str, ...], scale: float = 1.0) -> Tracks:
+def drawn(key: PRNGKeyArray, n: int, style: TrackStyle, room: int = 0) -> Tracks:
+    """A random track for each of n worlds, in arrays for `room` gates, or for as many as the style has."""
+    numbers = style.numbers(room)
+    return random_tracks(jax.random.uniform(key, (n, math.prod(numbers))).reshape(n, *numbers), style)
+
+
+def several(names: tuple[str, ...], scale: float = 1.0, chance: TrackStyle | None = None) -> Tracks:
     """Tracks with enlarged ground plans, one in each world, in arrays for as many gates as the longest has.
+
+    If a style is given, one name is `any`: in its place stands one track of that style, to be drawn anew.
 
     Raises:
         ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, and for a
@@ -112,12 +118,22 @@ def several(names: tuple[str, ...], scale: float = 1.0) -> Tracks:
         raise ValueError(f"task.track is {names!r}; accepted: a tuple of one or more tracks")
     if len({Path(name).stem for name in names}) < len(names):
         raise ValueError(f"task.track is {names}; accepted: tracks of different names, which tell the criteria")
-    tracks = [load_track(name).enlarged(scale) for name in names]
-    room = max(len(track.yaw) for track in tracks)
-    return jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(track, room) for track in tracks))
+    tracks, room = {name: load_track(name).enlarged(scale) for name in names if chance is None or name != ANY}, 0
+    if chance is not None:
+        tracks[ANY], room = random_tracks(np.zeros((1, *chance.numbers()), np.float32), chance).track(0), chance.most
+    room = max(room, *(len(track.yaw) for track in tracks.values()))
+    return jax.tree.map(lambda *x: np.concatenate(x), *(Tracks.of(tracks[name], room) for name in names))
 
 
-def displaced(key: PRNGKeyArray, n: int, given: Tracks, moved: Any, turned: Any, only: Any = -1.0) -> Tracks:
+def displaced(
+    key: PRNGKeyArray,
+    n: int,
+    given: Tracks,
+    moved: Any,
+    turned: Any,
+    only: Any = -1.0,
+    chance: tuple[int, TrackStyle] | None = None,
+) -> Tracks:
     """One of the given tracks for each of n worlds, with every gate slightly displaced.
 
     Args:
@@ -127,11 +143,18 @@ def displaced(key: PRNGKeyArray, n: int, given: Tracks, moved: Any, turned: Any,
         moved: half-width of each gate's offset, m per axis.
         turned: half-width of each gate's rotation, rad.
         only: number of the track that every world has. -1: any of them.
+        chance: number of the track in whose place random ones are drawn, and their style.
     """
     track_key, gate_key = jax.random.split(key)
     which = jax.random.randint(track_key, (n,), 0, given.count.shape[0])
     which = jnp.where(only < 0, which, jnp.asarray(only).astype(jnp.int32))
     tracks = jax.tree.map(lambda x: jnp.asarray(x)[which], given)
+    if chance is not None:
+        number, style = chance
+        other = drawn(jax.random.fold_in(track_key, 1), n, style, given.gates.count)
+        tracks = jax.tree.map(
+            lambda a, b: jnp.where((which == number).reshape(-1, *(1,) * (b.ndim - 1)), a, b), other, tracks
+        )
     g, count = tracks.gates, given.gates.count
     u = uniform(gate_key, n, 4 * count).reshape(n, count, 4)
     move, turn = moved * u[..., :3], turned * u[..., 3]

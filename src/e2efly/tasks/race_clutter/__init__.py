@@ -30,9 +30,12 @@ from e2efly.config import (
 from e2efly.config.domain import Domain, displaced, extent, track_domain, union
 from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.config.run import CRL_RACING
+from e2efly.courses.random_tracks import ANY, CLUTTERED
 from e2efly.courses.tracks import load_track
 from e2efly.tasks.registry import register
 
+THREE = ("s_shaped", "circle_3d", "j_shaped")
+"""The paper's tracks."""
 AUTHORS_CAMERA = CameraConfig(
     "depth", 64, 64, fov=(math.pi / 2, math.pi / 2), position=(0.1, 0.0, 0.0), reach=(0.2, 10.0),
     noise=ImageNoiseConfig(inverse_depth=0.05),
@@ -50,7 +53,9 @@ class RaceClutterConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.race_clutter.goal:RaceClutterRoute"
     best: ClassVar = "bptt"
     precision: ClassVar = "duration"
-    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
+    robust: ClassVar = {
+        "bptt": Robust(steps=15_000_000, chunk=200, recurrent=96, hidden=(128, 64), eased=(0.4, 4_000_000))
+    }
     cameras: ClassVar = (dataclasses.replace(AHEAD, width=48, height=24, noise_share=0.5),)
     curriculum: ClassVar = (
         StageConfig({"clutter.obstacles": 0.0}, success=0.8, steps=2_000_000),
@@ -60,6 +65,7 @@ class RaceClutterConfig(TaskConfig):
         weights={"prog1": 0.9, "act3": 1.0, "ori1": 0.04, "avoid1": 0.01, "goal": 5.0, "crash": 4.0},
         millions=(100, 50),
         silent=(
+            Sourced("task.track", THREE, "the paper's tracks"),
             Sourced("task.shows_axes", False, "the paper's observation has 17 numbers"),
             Sourced("task.collisions_end", True, f"{CRL_RACING}: envs/droneGymEnv.py, is_collision", "ppo"),
         ),
@@ -79,9 +85,9 @@ class RaceClutterConfig(TaskConfig):
 
     episode_s: float = 20.0
     """Length of an episode, s."""
-    track: tuple[str, ...] = shape(("s_shaped", "circle_3d", "j_shaped"))
-    """One or more of four_gates, s_shaped, circle_3d, j_shaped, or paths of .toml files. Every episode uses one of them
-    (their number and their gates set shapes)."""
+    track: tuple[str, ...] = shape((*THREE, ANY))
+    """One or more of four_gates, s_shaped, circle_3d, j_shaped, or paths of .toml files. any: random tracks. Every
+    episode uses one of them (their number and their gates set shapes)."""
     only: float = number(-1.0, low=-1)
     """Number of the track that every episode uses, counted from 0. -1: any of them."""
     scale: float = number(2.0, above=0)
@@ -122,7 +128,9 @@ class RaceClutterConfig(TaskConfig):
     def domain(self) -> Domain:
         """The tracks with their displaced gates, the commanded speed, and up to so many obstacles."""
         names = self.track if self.only < 0 else (self.track[int(self.only)],)
-        tracks = union(track_domain(load_track(name).enlarged(self.scale)) for name in names)
+        tracks = union(
+            CLUTTERED.domain if name == ANY else track_domain(load_track(name).enlarged(self.scale)) for name in names
+        )
         return (
             *displaced(tracks, self.gate_position, self.gate_yaw),
             extent("speed", "m/s", self.speed),

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.courses.gates import Tracks
+from e2efly.courses.random_tracks import ANY, CLUTTERED, TrackStyle
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
@@ -41,7 +42,7 @@ class ClutterWorld(AnyRaceMemory):
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=["config", "shape", "given"],
-    meta_fields=["control_period", "checks"],
+    meta_fields=["control_period", "checks", "chance"],
 )
 @dataclass(frozen=True)
 class RaceClutter(RaceClutterGoal):
@@ -49,6 +50,8 @@ class RaceClutter(RaceClutterGoal):
 
     given: Tracks
     """The tracks from which worlds are made, before gates are displaced."""
+    chance: tuple[int, TrackStyle] | None = None
+    """The number of the track in whose place random ones are drawn, and their style."""
 
     @classmethod
     def of(cls, config: RaceClutterConfig, shape: Shape, control_period: float, checks: int = 1) -> "RaceClutter":
@@ -58,19 +61,20 @@ class RaceClutter(RaceClutterGoal):
             ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
                 is not among them.
         """
-        given = several(config.track, config.scale)
+        chance = (config.track.index(ANY), CLUTTERED) if ANY in config.track else None
+        given = several(config.track, config.scale, chance and chance[1])
         count = len(config.track)
         if config.only not in range(-1, count):
             raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {count - 1}")
         # the tracks are resolved here, so that they share a compiled program
         numbers = dataclasses.replace(config, track=("",) * count)
-        return RaceClutter(numbers, shape, control_period, checks, given)
+        return RaceClutter(numbers, shape, control_period, checks, given, chance)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, ClutterWorld]:
         """At rest in a ball around the start of a track. Every world is different."""
         gate_key, clutter_key, state_key = jax.random.split(key, 3)
         c, u = self.config, uniform(state_key, n, 4)
-        tracks = displaced(gate_key, n, self.given, c.gate_position, c.gate_yaw, c.only)
+        tracks = displaced(gate_key, n, self.given, c.gate_position, c.gate_yaw, c.only, self.chance)
         g = tracks.gates
         state = at_rest(g.start + c.position * into_ball(u[:, :3]))
         zero = jnp.zeros(n)
