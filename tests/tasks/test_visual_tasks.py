@@ -18,7 +18,7 @@ from e2efly.simulation.scenes.scene import Solids, clearance
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.land_visual import LandVisualConfig
 from e2efly.tasks.race.any_goal import Ahead
-from e2efly.tasks.race_clutter import RaceClutterConfig
+from e2efly.tasks.race_clutter import THREE, RaceClutterConfig
 from e2efly.tasks.race_clutter.world import ClutterWorld, _path
 from e2efly.tasks.task import Flier, Outcome, Shape, at_rest, make_task, struck
 
@@ -119,13 +119,10 @@ def test_a_forest_is_as_dense_as_asked_and_clear_of_the_start() -> None:
     assert len(np.unique(np.asarray(memory.trees.centre[:, 0, 0]))) == 300
 
 
-TRACKS = RaceClutterConfig().track
-
-
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("only", [-1, 0, 1, 2])
 def test_clutter_leaves_gates_and_start_free(only: int) -> None:
-    task = make_task(RaceClutterConfig(only=only), SHAPE, PERIOD, 7)
+    task = make_task(RaceClutterConfig(track=THREE, only=only), SHAPE, PERIOD, 7)
     n = 200
     state, memory = jax.jit(task.start, static_argnums=1)(random_key(3), n)
     scene, zero = task.scene(memory), jnp.zeros(n)
@@ -147,11 +144,34 @@ def test_clutter_leaves_gates_and_start_free(only: int) -> None:
     assert 0.17 < np.abs(turned).max() <= 0.2 + 1e-5
 
 
-@pytest.mark.parametrize("track", TRACKS)
+def test_random_tracks_are_others_in_every_world_and_their_gates_are_free() -> None:
+    config = RaceClutterConfig()
+    task, n = make_task(RaceClutterConfig(only=config.track.index("any")), SHAPE, PERIOD, 7), 200
+    state, memory = jax.jit(task.start, static_argnums=1)(random_key(3), n)
+    assert np.asarray(clearance(task.scene(memory), state.position, jnp.zeros(n))).min() > SHAPE.radius
+    tracks, gates = memory.tracks, memory.tracks.gates
+    assert {int(k) for k in tracks.count} == {3, 4, 5, 6}
+    assert 0.2 < np.asarray(tracks.closed).mean() < 0.6
+    second = np.asarray(gates.position[:, 1])
+    assert len(np.unique(second, axis=0)) == n
+    for gate in range(gates.count):
+        there = gate < np.asarray(tracks.count)
+        obstacles = dataclasses.replace(task.scene(memory), solids=memory.obstacles)
+        free = np.asarray(clearance(obstacles, gates.position[:, gate], jnp.zeros(n)))
+        least = np.minimum(0.7, np.asarray(gates.position[:, gate, 2]) - 1e-3)  # the ground may be nearer
+        assert (free >= least)[there].all()
+    mixed = make_task(config, SHAPE, PERIOD, 7)
+    _, memory = jax.jit(mixed.start, static_argnums=1)(random_key(3), n)
+    given = np.asarray(mixed.given.gates.position)[:, 1]
+    known = np.linalg.norm(np.asarray(memory.tracks.gates.position)[:, None, 1] - given[:3], axis=-1).min(axis=1) < 0.53
+    assert 0.6 < known.mean() < 0.9  # three of four
+
+
+@pytest.mark.parametrize("track", THREE)
 def test_one_of_several_tracks_is_the_track_alone(track: str) -> None:
     """Worlds with room for more gates than the track has differ in nothing that is seen, asked for or judged."""
     alone = make_task(RaceClutterConfig(track=(track,)), SHAPE, PERIOD, 7)
-    among = make_task(RaceClutterConfig(only=TRACKS.index(track)), SHAPE, PERIOD, 7)
+    among = make_task(RaceClutterConfig(only=THREE.index(track)), SHAPE, PERIOD, 7)
     own = Tracks.of(load_track(track).enlarged(2.0))
     wide = Tracks.of(load_track(track).enlarged(2.0), 6)
     place = at(own.gates.start[0] + np.array([1.0, 0.5, 0.0]), (3.0, 0.0, 0.0))
@@ -181,8 +201,8 @@ def test_tracks_are_several(track: Any) -> None:
     ("changes", "message"),
     [
         ({"track": ("j_shaped", "j_shaped")}, r"task.track is .*; accepted: tracks of different names"),
-        ({"only": 3.0}, "task.only is 3.0; accepted: whole numbers from -1 to 2"),
-        ({"only": 0.5}, "task.only is 0.5; accepted: whole numbers from -1 to 2"),
+        ({"only": 4.0}, "task.only is 4.0; accepted: whole numbers from -1 to 3"),
+        ({"only": 0.5}, "task.only is 0.5; accepted: whole numbers from -1 to 3"),
     ],
 )
 def test_no_track_is_chosen_or_judged_silently(changes: dict[str, Any], message: str) -> None:
@@ -191,7 +211,7 @@ def test_no_track_is_chosen_or_judged_silently(changes: dict[str, Any], message:
 
 
 @pytest.mark.whole(but=1)
-@pytest.mark.parametrize("only", [0, 1])
+@pytest.mark.parametrize("only", [0, 1, 3])
 def test_a_lap_in_clutter_is_the_gates_in_order_without_a_touch(only: int) -> None:
     empty = dataclasses.replace(RaceClutterConfig().clutter, obstacles=0.0)
     task = make_task(RaceClutterConfig(clutter=empty, only=only), SHAPE, PERIOD, 7)
