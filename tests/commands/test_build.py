@@ -92,7 +92,7 @@ def test_a_vehicle_outside_of_every_range_is_trained_for_and_a_stopped_build_goe
     assert not out.exists()
     said = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["hover", "taken:", "any/hover"] in said
-    assert ["race_clutter", "trained:", "preset", "robust,", "12.0", "M", "steps"] in said
+    assert ["race_clutter", "trained:", "preset", "robust,", "15.0", "M", "steps"] in said
     assert run(["build", str(parts), "--out", str(out), "--tasks", "hover"]) == 0
     assert (out / "hover" / "policy.onnx").read_bytes() == policy_file("any/hover").read_bytes()
     asked = ["build", str(parts), "--out", str(out), "--tasks", "hover", "race_clutter", "--train", "hover"]
