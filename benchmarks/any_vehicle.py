@@ -97,7 +97,11 @@ def main() -> None:
     known = [f"any/{task}" for task in zoo.get("any", {})]
     options = arguments(__doc__ or "", policies=known, vehicles=1000, parts=["delays", "strengths", "named"])
     rows: list[dict[str, Any]] = []
-    asked = json.loads(path.read_text())["question_us"] if (path := RESULTS / "any_vehicle.json").exists() else {}
+    asked = (
+        json.loads(path.read_text())["question_us"]
+        if (path := options.json or RESULTS / "any_vehicle.json").exists()
+        else {}
+    )
     for policy in options.policies:
         low, high = e2efly.load_policy(policy).contract.latency_range_s
         every = f"{1e3 * low:.0f} to {1e3 * high:.0f} ms"

@@ -71,9 +71,28 @@ class TrackStyle:
     """Range of the height of the track's top, m."""
     pieces: float
     """Pieces of open tracks have a number below this."""
-    domain: Domain
-    """The domain of a policy of such tracks. From `gate_distance` on, the ranges are those of some 100 000 tracks. Of a
-    thousand gates, one is nearer to the next one than `CLEAR`."""
+    farthest: float
+    """Largest distance, m, of ..."""
+    rise: float
+    """... largest rise, m, of ..."""
+    bearing: float
+    """... and largest bearing, rad, of the next gate, of some 100 000 tracks."""
+
+    @property
+    def domain(self) -> Domain:
+        """The domain of a policy of such tracks. Of a thousand gates, one is nearer to the next one than `CLEAR`."""
+        low = self.opening[0] / 2
+        return (
+            Extent("gates", "1", FEWEST, self.most),
+            Extent("gate_width", "m", *self.opening),
+            Extent("gate_height", "m", *self.opening),
+            Extent("gate_altitude", "m", LOWEST + low, self.top[1] - low),
+            Extent("gate_distance", "m", CLEAR, self.farthest),
+            Extent("gate_rise", "m", -self.rise, self.rise),
+            Extent("gate_bearing", "rad", -self.bearing, self.bearing),
+            Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
+            Extent("start_distance", "m", 2.5, 6.1),
+        )
 
     def numbers(self, room: int = 0) -> tuple[int, int]:
         """The shape of the uniform numbers for a track, in arrays for `room` gates, or for as many as it may have."""
@@ -86,17 +105,9 @@ RACING = TrackStyle(
     opening=(0.6, 1.5),
     top=(4.0, 8.0),
     pieces=1.0,
-    domain=(
-        Extent("gates", "1", FEWEST, 12),
-        Extent("gate_width", "m", 0.6, 1.5),
-        Extent("gate_height", "m", 0.6, 1.5),
-        Extent("gate_altitude", "m", LOWEST + 0.6 / 2, 8.0 - 0.6 / 2),
-        Extent("gate_distance", "m", CLEAR, 50.0),
-        Extent("gate_rise", "m", -6.7, 6.7),
-        Extent("gate_bearing", "rad", -2.85, 2.85),
-        Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
-        Extent("start_distance", "m", 2.5, 6.1),
-    ),
+    farthest=50.0,
+    rise=6.7,
+    bearing=2.85,
 )
 """Tracks to race on as fast as one can."""
 CLUTTERED = TrackStyle(
@@ -105,17 +116,9 @@ CLUTTERED = TrackStyle(
     opening=(1.0, 1.0),
     top=(2.5, 4.0),
     pieces=HAIRPINS,
-    domain=(
-        Extent("gates", "1", FEWEST, 6),
-        Extent("gate_width", "m", 1.0, 1.0),
-        Extent("gate_height", "m", 1.0, 1.0),
-        Extent("gate_altitude", "m", LOWEST + 1.0 / 2, 4.0 - 1.0 / 2),
-        Extent("gate_distance", "m", CLEAR, 30.0),
-        Extent("gate_rise", "m", -2.7, 2.7),
-        Extent("gate_bearing", "rad", -2.9, 2.9),
-        Extent("gate_turn", "rad", FIRST, FIRST + 2 * math.pi),
-        Extent("start_distance", "m", 2.5, 6.1),
-    ),
+    farthest=30.0,
+    rise=2.7,
+    bearing=2.9,
 )
 """Tracks on which there is room for obstacles between the gates."""
 
