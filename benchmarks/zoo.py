@@ -61,10 +61,10 @@ from e2efly.validation.stress import every_row
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
-VARIANTS = {"race_any": ("race", "any_track")}
+VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors")}
 """Policies of a task by a preset of its own: task and preset."""
-USUAL_ALONE = (*VARIANTS, "race_clutter_room")
-"""For the usual vehicle alone."""
+ALONE = {"race_any": USUAL, "race_clutter_room": USUAL, "hover_rotors": presets.FAMILY}
+"""For this vehicle alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
 PER_ROW = 250
@@ -134,7 +134,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
     suites = json.loads(report.read_text())["criteria"]
     summary = json.loads((out / "summary.json").read_text())
     reported = worst_success(summary["nominal" if together else "shipped"])
-    more: dict[str, Any] = {"preset": "robust"} if together else {"preset": name} if name else {}
+    more: dict[str, Any] = {"preset": name or "robust"} if name or together else {}
     if name == "robust":
         if chosen:
             options = ("--episodes", str(PER_ROW), "--seed", str(CHOSEN_BY), "--rows", *rows_for(TASKS[task].cameras))
@@ -280,16 +280,17 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             config = RunDirectory(out).config()
             vehicle, kind = config.env.vehicle, config.task.name
-            task = next((name for name, (of, _) in VARIANTS.items() if of == kind and config.task.own_worlds), kind)
+            task = "race_any" if kind == "race" and config.task.own_worlds else kind
+            task = "hover_rotors" if config.env.command_mode == "rotor_share" else task
             _, about = judged(vehicle, task, out, Path(folder), chosen=False)
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:
         for task in options.tasks:
-            if task in USUAL_ALONE and vehicle != USUAL:
+            if vehicle != ALONE.get(task, vehicle):
                 continue
             if task in TASKS and TASKS[task].cameras and vehicle not in SEEING:
                 continue
-            if vehicle in family_names() and TASKS[task].best not in TASKS[task].family:
+            if vehicle in family_names() and algorithms(task)[0] not in TASKS[recipe(vehicle, task)[0]].family:
                 continue
             with tempfile.TemporaryDirectory() as folder:
                 highest, best, policy = -1.0, {}, Path()

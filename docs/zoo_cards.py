@@ -23,6 +23,7 @@ from e2efly.vehicles.family import load_family
 DOCS = Path(__file__).parent
 TASKS = {
     "hover": "Fly to a point and stay there.",
+    "hover_rotors": "The same by commands to each rotor, a hundred a second ([any vehicle](any-vehicle.md)).",
     "land": "Land on a point of the ground, gently.",
     "track": "Follow a moving reference.",
     "race": "Fly a lap through gates.",
@@ -132,7 +133,7 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     """The lines of one policy's card."""
     name = f"{vehicle}/{task}"
     policy = policy_file(name)
-    kind = task.removesuffix("_any")
+    kind = task.removesuffix("_any").removesuffix("_rotors")
     options = "" if vehicle == USUAL else f" --vehicle {vehicle}"
     preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
     stress = about.get("stress", {})
