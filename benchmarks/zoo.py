@@ -133,7 +133,7 @@ def judged(vehicle: str, task: str, out: Path, folder: Path, chosen: bool = True
     run("eval", str(lone), "--json", str(report), "--plots", str(folder / "plots"))
     suites = json.loads(report.read_text())["criteria"]
     summary = json.loads((out / "summary.json").read_text())
-    reported = worst_success(summary["nominal" if together else "shipped"])
+    reported = worst_success(summary.get("nominal", summary["shipped"]) if together else summary["shipped"])
     more: dict[str, Any] = {"preset": name or "robust"} if name or together else {}
     if name == "robust":
         if chosen:
