@@ -9,9 +9,11 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, vehicle_of
+from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, value_of, vehicle_of
+from e2efly.alignment.response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
+from e2efly.alignment.wrench import solved
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import MOTORS, Record
 from e2efly.vehicles.vehicle import Vehicle
@@ -36,7 +38,9 @@ LEAST = 1.5
 """Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
 refused by its standard deviation."""
 TORQUES = 200.0
-"""Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
+"""Sampling rate of motor outputs and rotor speeds from which on they show the torques on the body, Hz."""
+SURE = 3.0
+"""Number of standard deviations from which on an effect that the vehicle file does not have counts as shown."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
 values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
@@ -61,6 +65,23 @@ class Refusal:
 
 
 @dataclass(frozen=True)
+class Part:
+    """Unknowns that were fitted together."""
+
+    base: Vehicle
+    """The vehicle at which all of them are zero."""
+    unknowns: tuple[Unknown, ...]
+    p: np.ndarray
+    """(u,) their values."""
+    sigma: np.ndarray
+    """(u,) their standard deviations."""
+    covariance: np.ndarray
+    """(u, u) whose correlations hold."""
+    noise: dict[str, float]
+    """Spread of each sensor about the model."""
+
+
+@dataclass(frozen=True)
 class Found:
     """The result of the identification from flights."""
 
@@ -78,6 +99,14 @@ class Found:
     """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
     structures: dict[str, np.ndarray]
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
+    response: Part | None = None
+    """What the rotor speeds show of lag, delay and rate loop, if they were measured."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """What was fitted, each part by itself."""
+        own = Part(self.model.base, self.model.unknowns, self.p, self.sigma, self.fit.covariance, self.fit.noise)
+        return (own,) if self.response is None else (own, self.response)
 
 
 def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
@@ -93,7 +122,9 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
+    if not step and all(record.has("rotor_speed") and record.streams["rotor_speed"].rate >= TORQUES for record in records):
+        wanted = ("rotor_speed",)
+    elif not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
         wanted = ("motor",)
     for name in wanted:
         if all(_drives(record, name, step) for record in records):
@@ -181,6 +212,8 @@ def identify(
     every = min(HELD_OUT, windows.count)
     held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
+    if driver == "rotor_speed":
+        return _measured(model, windows, held_out, records)
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
     impossible = _impossible(model, found.p)
@@ -204,11 +237,35 @@ def identify(
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
     refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
-    estimates = _estimates(model, p, sigma, refused, source)
+    estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
     if not step:  # with `step`, the fitted delay from command to response is the result
         estimates = [e for e in estimates if e.name != "latency"]
         estimates += _latency(model, records, found, p, sigma, refused, source)
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
+
+
+def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Sequence[Record]) -> Found:
+    """The identification from rotor speeds: forces and torques, and the response to commands, each by itself."""
+    solution, q = solved(model, windows.some(~held_out), records)
+    u = len(model.unknowns)
+    found = Fit(
+        solution.x[:u], q, solution.covariance[:u, :u], solution.assumed[:u, :u], solution.noise, solution.iterations
+    )
+    sigma, source = sigmas(model, found), f"{', '.join(r.path.name for r in records)}; flight"
+    refused = np.array([_is_vague(x, off) for x, off in zip(model.unknowns, sigma, strict=True)])
+    p = _given(found.p, whole_covariance(found, sigma), refused)
+    refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
+    estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
+    part = None
+    if all(_drives(record, "command") for record in records):
+        answer = responded(model, records)
+        off = np.sqrt(np.maximum(np.diag(answer.covariance), np.diag(answer.assumed)))
+        off = np.hypot(off, [STRUCTURE.get(x.field, 0.0) for x in RESPONSE])
+        vague = np.array([_is_vague(x, o) for x, o in zip(RESPONSE, off, strict=True)])
+        refusals += [Refusal(RESPONSE[i], float(off[i])) for i in np.flatnonzero(vague)]
+        part = Part(model.base, RESPONSE, answer.x, off, answer.covariance, answer.noise)
+        estimates += _estimates(model.base, RESPONSE, answer.x, off, vague, source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, {}, part)
 
 
 def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
@@ -272,7 +329,7 @@ def _latency(
 def _is_vague(unknown: Unknown, sigma: float) -> bool:
     """Whether the flights say too little about an unknown."""
     limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
-    return bool(sigma > min(limit, SHOWN * unknown.prior))
+    return bool(sigma > min(np.inf if unknown.added and unknown.field not in EXACT else limit, SHOWN * unknown.prior))
 
 
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
@@ -281,7 +338,7 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
     If the model explains a torque by something else, such as the rotors' own inertia, a moment has no bound in the fit.
     """
-    moments = np.asarray(vehicle_of(model, jnp.asarray(p)).inertia, float)
+    moments = np.asarray(vehicle_of(model.base, model.unknowns, jnp.asarray(p)).inertia, float)
     largest = int(np.argmax(moments))
     at = np.array([u.field == "inertia" and u.entries == (largest,) for u in model.unknowns])
     return at & (2 * moments[largest] > moments.sum())
@@ -309,21 +366,28 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
     return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
 
 
-def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
-    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file."""
+def _estimates(
+    base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str
+) -> list[Estimate]:
+    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file, and so are
+    effects that it does not have and that are not shown.
+    """
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
-        if vague or not unknown.field:
+    shown = [u.field for u, x, off in zip(unknowns, p, sigma, strict=True) if abs(x) > SURE * off]
+    for unknown, x, off, vague in zip(unknowns, p, sigma, refused, strict=True):
+        absent = unknown.field and getattr(base, unknown.field) is None
+        if vague or not unknown.field or (absent and unknown.added and unknown.field not in shown):
             continue
-        base = np.asarray(getattr(model.base, unknown.field), float)
-        value, spread = values.setdefault(unknown.field, (np.full(base.shape, np.nan), np.full(base.shape, np.nan)))
+        own = value_of(base, unknown.field)
+        lacking = own if absent else np.full(own.shape, np.nan)
+        value, spread = values.setdefault(unknown.field, (lacking.copy(), np.full(own.shape, np.nan)))
         at = list(unknown.entries) if unknown.entries else ...
-        if unknown.field == "latency":
-            value[at], spread[at] = base + x, off
+        if unknown.added:
+            value[at], spread[at] = own[at] + x, off
         else:
-            value[at], spread[at] = base[at] * np.exp(x), np.abs(base[at]) * np.exp(x) * off
+            value[at], spread[at] = own[at] * np.exp(x), np.abs(own[at]) * np.exp(x) * off
         if unknown.field == "thrust_map":  # the largest thrust grows with the map
-            top = float(model.base.rotor_thrust_max) * np.exp(x)
+            top = float(base.rotor_thrust_max) * np.exp(x)
             values["rotor_thrust_max"] = np.array(top), np.array(top * off)
     return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()]
 

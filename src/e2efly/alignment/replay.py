@@ -96,9 +96,9 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     """Rotor speeds at the start, (4,) rad/s. The motors follow the outputs that the rate loop gives at the measured
     rates.
     """
-    vehicle, before = vehicle_of(model, p), window["before"]
+    vehicle, before = vehicle_of(model.base, model.unknowns, p), window["before"]
     plant = Airframe.of(vehicle, STEP)
-    asked, _ = commanded(model, vehicle, window["driven"])
+    asked, _ = commanded(vehicle.latency, window["driven"])
     law = control_law(COMMAND_MODES["ctbr"])
     controller = model.controller(vehicle)
 
