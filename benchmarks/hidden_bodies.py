@@ -17,7 +17,6 @@ import numpy as np
 from e2efly.validation.flight_controller import Numbers
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
-from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
 WIDTHS = {
@@ -27,8 +26,8 @@ WIDTHS = {
 """Largest relative change of each value, drawn uniformly."""
 DELAY = (0.02, 0.08)
 """Range of the delay from a command to the rate loop, s."""
-SMOOTHED = 0.01
-"""Time constant of the filter of the commanded rates whose derivative the feed-forward takes, s."""
+SMOOTHED = (0.005, 0.02)
+"""Range of the time constant of the filter of the commanded rates whose derivative the feed-forward takes, s."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +39,8 @@ class Body:
     """(4,) thrust of each rotor over that of the thrust map."""
     feed_forward: float = 0.0
     """Commanded angular acceleration over the derivative of the commanded rate."""
+    smoothed: float = 0.01
+    """Time constant of the filter of the commanded rates before that derivative, s."""
     rotor_drag: float = 0.0
     """Force across the rotor axes over the sum of the rotor speeds and the speed of the air, N s^2/(m rad)."""
     sag: float = 0.0
@@ -107,6 +108,7 @@ def drawn(vehicle: Vehicle, rng: np.random.Generator) -> Body:
         ),
         np.ones(4) if share is None else share,
         forward or 0.0,
+        float(rng.uniform(*SMOOTHED)),
         rotor_drag or 0.0,
         sag or 0.0,
         np.zeros(3) if wind is None else wind,
@@ -129,7 +131,7 @@ class HiddenRateLoop:
         flown = body.vehicle
         self._gain, self._limit = np.asarray(flown.rate_gain), np.asarray(believed.body_rate_max)
         self._integral_gain = np.zeros(3) if flown.rate_integral_gain is None else flown.rate_integral_gain
-        self._filter, self._forward = flown.gyro_time_constant, body.feed_forward
+        self._filter, self._forward, self._smoothed = flown.gyro_time_constant, body.feed_forward, body.smoothed
         self.start([0.0, 0.0, 0.0])
 
     def start(self, body_rate: Numbers) -> None:
@@ -143,8 +145,8 @@ class HiddenRateLoop:
             self._seen = rate + (self._seen - rate) * math.exp(-dt / self._filter)
             rate = self._seen
         wanted = np.clip(command[1:], -self._limit, self._limit)
-        change = (wanted - self._smooth) / SMOOTHED
-        self._smooth = wanted + (self._smooth - wanted) * math.exp(-dt / SMOOTHED)
+        change = (wanted - self._smooth) / self._smoothed
+        self._smooth = wanted + (self._smooth - wanted) * math.exp(-dt / self._smoothed)
         error = wanted - rate
         most = self._gain * self._limit
         self._integral = np.clip(self._integral + self._integral_gain * error * dt, -most, most)
@@ -204,15 +206,13 @@ def truths(body: Body, believed: Vehicle) -> Vehicle:
     """
     v = body.vehicle
     by_arm = np.asarray(believed.rotor_position)[0] / np.asarray(v.rotor_position)[0]  # x, y
+    whole = np.array([by_arm[1], by_arm[0], 1.0])
+    products = None if v.inertia_products is None else v.inertia_products * np.sqrt(whole[[0, 0, 1]] * whole[[1, 2, 2]])
     return dataclasses.replace(
         v,
         thrust_map=v.thrust_map * float(np.mean(body.share)),
         rotor_thrust_max=v.rotor_thrust_max * float(np.mean(body.share)),
-        inertia=v.inertia * np.array([by_arm[1], by_arm[0], 1.0]),
+        inertia=v.inertia * whole,
+        inertia_products=products,
         drag_linear=body.drag,
     )
-
-
-def hover_share(body: Body) -> float:
-    """Thrust of hover over the largest: a body above 0.7 cannot fly the excitation."""
-    return float(body.vehicle.mass * GRAVITY / (4 * body.vehicle.rotor_thrust_max * np.mean(body.share)))

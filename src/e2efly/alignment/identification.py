@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
 from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, value_of, vehicle_of
 from e2efly.alignment.response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
@@ -26,11 +27,18 @@ EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of the results between models that differ in properties that no log shows: how often the flight controller
 runs, and how the accelerometer is filtered. In s for the delay, else relative."""
+ROTOR_STRUCTURE = STRUCTURE | {
+    "motor_time_constant_down": 0.015, "rate_gain": 0.02, "rate_integral_gain": 3.0, "gyro_time_constant": 5e-4,
+    "centre_of_mass": 1e-4, "inertia_products": 6e-6, "drag_linear": 0.1, "drag_quadratic": 0.1,
+}  # fmt: skip
+"""The same when rotor speeds were measured. Fields that are added: in their unit. Gusts, and the drag of the rotors
+themselves, count as drag of the body."""
 MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
 """The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so is
 the accelerometer's filter."""
 SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 """The same when motor outputs are logged so rarely that they are interpolated between samples."""
+STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
 POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
@@ -101,6 +109,8 @@ class Found:
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
     response: Part | None = None
     """What the rotor speeds show of lag, delay and rate loop, if they were measured."""
+    misfits: tuple[Misfit, ...] = ()
+    """What the fit leaves over, by sensor."""
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -122,7 +132,7 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(record.has("rotor_speed") and record.streams["rotor_speed"].rate >= TORQUES for record in records):
+    if not step and all(r.has("rotor_speed") and r.streams["rotor_speed"].rate >= TORQUES for r in records):
         wanted = ("rotor_speed",)
     elif not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
         wanted = ("motor",)
@@ -168,6 +178,7 @@ def identify(
     step: bool = False,
     delay: bool = True,
     volts: float | None = None,
+    plain: bool = False,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Found:
     """Identify a vehicle from flights.
@@ -179,6 +190,7 @@ def identify(
         step: find only the delay and the rate loop, which steps of body rate show.
         delay: with `step`, also find the delay.
         volts: battery voltage for which the thrust is given, V. If omitted, the typical voltage of these flights.
+        plain: from rotor speeds, look for nothing that the vehicle's file does not have.
         told: called with (iteration, cost) after each iteration of the fit.
 
     Raises:
@@ -213,9 +225,10 @@ def identify(
     held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
     if driver == "rotor_speed":
-        return _measured(model, windows, held_out, records)
+        return _measured(model, windows, held_out, records, plain)
     found = fit(model, seen, begin(model, seen), told=told)
-    sigma = sigmas(model, found)
+    wider = widened(misfits(found, seen, records))
+    sigma = wider * sigmas(model, found)
     impossible = _impossible(model, found.p)
     refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
     p = _given(found.p, whole_covariance(found, sigma), refused)
@@ -224,7 +237,7 @@ def identify(
             break
         # far from the fitted values, the linear correction of `_given` is not valid
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
-        sigma = np.where(refused, sigma, sigmas(model, found))
+        sigma = np.where(refused, sigma, wider * sigmas(model, found))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
         more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
@@ -239,33 +252,56 @@ def identify(
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
     if not step:  # with `step`, the fitted delay from command to response is the result
+        at = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
+        answered = None if at is None else (float(model.base.latency) + float(p[at]), float(sigma[at]))
+        seldom = driver == "motor_and_rate"
         estimates = [e for e in estimates if e.name != "latency"]
-        estimates += _latency(model, records, found, p, sigma, refused, source)
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
+        estimates += _latency(records, found.q, answered if driver == "command" else None, seldom, source)
+    left = tuple(misfits(found, seen, records))
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, misfits=left)
 
 
-def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Sequence[Record]) -> Found:
+def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Sequence[Record], plain: bool) -> Found:
     """The identification from rotor speeds: forces and torques, and the response to commands, each by itself."""
-    solution, q = solved(model, windows.some(~held_out), records)
+    seen = windows.some(~held_out)
+    solution, q, squares = solved(model, seen, records, plain)
     u = len(model.unknowns)
     found = Fit(
-        solution.x[:u], q, solution.covariance[:u, :u], solution.assumed[:u, :u], solution.noise, solution.iterations
-    )
-    sigma, source = sigmas(model, found), f"{', '.join(r.path.name for r in records)}; flight"
-    refused = np.array([_is_vague(x, off) for x, off in zip(model.unknowns, sigma, strict=True)])
+        solution.x[:u], q, solution.covariance[:u, :u], solution.assumed[:u, :u], solution.noise, solution.iterations,
+        squares,
+    )  # fmt: skip
+    left = misfits(found, seen, records)
+    sigma, source = widened(left) * sigmas(model, found), f"{', '.join(r.path.name for r in records)}; flight"
+    refused, refusals = _vague(model.unknowns, sigma, model.base, plain)
     p = _given(found.p, whole_covariance(found, sigma), refused)
-    refusals = [Refusal(model.unknowns[i], float(sigma[i])) for i in np.flatnonzero(refused)]
     estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
-    part = None
+    part = answered = None
     if all(_drives(record, "command") for record in records):
-        answer = responded(model, records)
+        answer, more = responded(model, records, plain)
         off = np.sqrt(np.maximum(np.diag(answer.covariance), np.diag(answer.assumed)))
-        off = np.hypot(off, [STRUCTURE.get(x.field, 0.0) for x in RESPONSE])
-        vague = np.array([_is_vague(x, o) for x, o in zip(RESPONSE, off, strict=True)])
-        refusals += [Refusal(RESPONSE[i], float(off[i])) for i in np.flatnonzero(vague)]
+        off = np.hypot(off, [ROTOR_STRUCTURE.get(x.field, 0.0) for x in RESPONSE])
+        off *= widened(more)
+        left += more
+        vague, unsure = _vague(RESPONSE, off, model.base, plain)
+        refusals += unsure
         part = Part(model.base, RESPONSE, answer.x, off, answer.covariance, answer.noise)
-        estimates += _estimates(model.base, RESPONSE, answer.x, off, vague, source)
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, {}, part)
+        told = {e.name: e for e in _estimates(model.base, RESPONSE, answer.x, off, vague, source)}
+        if (late := told.pop("latency", None)) is not None:
+            answered = float(late.value), float(late.sigma)
+        estimates += told.values()
+    estimates += _latency(records, q, answered, False, source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, {}, part, tuple(left))
+
+
+def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[Misfit]:
+    """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others."""
+    left = []
+    for name in found.squares:
+        if name not in ("quaternion", "position"):
+            moved = motion(windows.measured[name], windows.there[name])
+            white = np.mean([white_noise(r.streams[name].values) for r in records if r.has(name)])
+            left.append(misfit(name, found.squares[name], moved, float(white)))
+    return left
 
 
 def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
@@ -290,40 +326,41 @@ def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarr
 
 
 def _latency(
-    model: Model,
-    records: Sequence[Record],
-    found: Fit,
-    p: np.ndarray,
-    sigma: np.ndarray,
-    refused: np.ndarray,
-    source: str,
+    records: Sequence[Record], q: np.ndarray, answered: tuple[float, float] | None, seldom: bool, source: str
 ) -> list[Estimate]:
     """The latency from the vehicle's motion to its rate loop. It is the delay from a command to the rate loop plus, if
     the log contains it, the age of the poses from which the command was computed.
 
-    The first delay is found from the setpoints, if the flight controller logs them, else by the fit of commands. A
-    delay of motor outputs is not a property of the vehicle. With rarely logged data of a flight controller, the delay
-    between that data and the poses says nothing about the age of the poses, because the data itself is late, by up to
-    the time between two samples.
+    The first delay is found from the setpoints, if the flight controller logs them, else it is what the fit of commands
+    has `answered`: the delay and its standard deviation, s. A delay of motor outputs is not a property of the vehicle.
+    With data of a flight controller that is logged `seldom`, the delay between that data and the poses says nothing
+    about the age of the poses, because the data itself is late, by up to the time between two samples.
     """
     shown = [late for late in map(setpoint_delay, records) if late is not None]
-    at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
     if shown:
         late, off = float(np.mean(shown)), DELAY_SIGMA
-    elif at and model.driver == "command":
-        late, off = float(model.base.latency) + float(p[at[0]]), float(sigma[at[0]])
+    elif answered is not None:
+        late, off = answered
     else:
         return []
-    seldom = model.driver == "motor_and_rate"
     if seldom:  # every time within an interval is equally likely
         off = float(np.hypot(off, np.median([np.median(np.diff(r.streams["motor"].time)) for r in records]) / 12**0.5))
     ages = [
-        record.pose_age + (0.0 if seldom else float(q[POSE_DELAY]))
-        for record, q in zip(records, found.q, strict=True)
+        record.pose_age + (0.0 if seldom else float(own[POSE_DELAY]))
+        for record, own in zip(records, q, strict=True)
         if record.pose_age is not None
     ]
     total = max(late + (float(np.mean(ages)) if ages else 0.0), 0.0)
     return [Estimate("latency", np.array(total), np.array(off), source)]
+
+
+def _vague(
+    unknowns: Sequence[Unknown], sigma: np.ndarray, base: Vehicle, plain: bool
+) -> tuple[np.ndarray, list[Refusal]]:
+    """Which unknowns are not taken over, (u,), and the refusals of those that were looked for."""
+    vague = np.array([_is_vague(unknown, off) for unknown, off in zip(unknowns, sigma, strict=True)])
+    held = np.array([plain and unknown.absent(base) for unknown in unknowns])
+    return vague | held, [Refusal(unknowns[i], float(sigma[i])) for i in np.flatnonzero(vague & ~held)]
 
 
 def _is_vague(unknown: Unknown, sigma: float) -> bool:
@@ -362,7 +399,7 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
     of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
-    structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
+    structure = STRUCTURES.get(model.driver, STRUCTURE)
     return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
 
 
@@ -378,7 +415,7 @@ def _estimates(
         absent = unknown.field and getattr(base, unknown.field) is None
         if vague or not unknown.field or (absent and unknown.added and unknown.field not in shown):
             continue
-        own = value_of(base, unknown.field)
+        own = np.asarray(value_of(base, unknown.field), float)
         lacking = own if absent else np.full(own.shape, np.nan)
         value, spread = values.setdefault(unknown.field, (lacking.copy(), np.full(own.shape, np.nan)))
         at = list(unknown.entries) if unknown.entries else ...

@@ -19,6 +19,8 @@ HUBER = 2.0
 """Up to this number of standard deviations, a residual counts with its square."""
 NEIGHBOURS = 4
 """Number of groups over which the correlation of neighbouring groups counts."""
+HELD = 1e-9
+"""Prior standard deviation of a number that stays zero."""
 STILL = 0.01
 """If a step changes every number by less than this part of its standard deviation, it is the last."""
 
@@ -35,10 +37,8 @@ class Solution:
     """(k, k) the covariance for white residuals."""
     noise: dict[str, float]
     """Root mean square of the residuals of each sensor."""
-    gradients: np.ndarray
-    """(groups, k) of each group, at the solution."""
-    curvatures: np.ndarray
-    """(groups, k, k) of each group, at the solution."""
+    left: dict[str, np.ndarray]
+    """By sensor, (groups, rows): the residuals, in its unit."""
     iterations: int
 
 
@@ -50,6 +50,7 @@ def solve(
     prior: np.ndarray,
     floor: Mapping[str, float],
     least: np.ndarray | None = None,
+    held: np.ndarray | None = None,
     iterations: int = 25,
 ) -> Solution:
     """The numbers whose residuals are smallest.
@@ -62,9 +63,12 @@ def solve(
         prior: standard deviations about zero, (k,).
         floor: the smallest spread of each sensor, in its unit.
         least: the smallest possible values, (k,). None: none is known.
+        held: (k,) which numbers stay zero. None: none does.
         iterations: the largest number of iterations.
     """
     least = np.full(len(start), -np.inf) if least is None else least
+    if held is not None:
+        start, prior = np.where(held, 0.0, start), np.where(held, HELD, prior)
     of, slopes = jax.jit(residuals), jax.jit(jax.jacfwd(residuals))
     counts = {name: max(float(mask.sum()), 1.0) for name, mask in there.items()}
 
@@ -75,11 +79,12 @@ def solve(
         by_sensor = sum(float(np.sum(_huber(v / noise[k]) * there[k])) for k, v in r.items())
         return by_sensor + 0.5 * float(np.sum((x / prior) ** 2))
 
-    x, damping, i = np.maximum(start, least), 1e-3, 0
+    x, damping, done = np.maximum(start, least), 1e-3, 0
     r = _numpy(of(jnp.asarray(x), data))
     noise = spread(r)
     gradients, curvatures = _terms(_numpy(slopes(jnp.asarray(x), data)), r, noise, there)
-    for i in range(1, iterations + 1):
+    for _ in range(iterations):
+        done += 1
         H = curvatures.sum(0) + np.diag(prior**-2)
         g = gradients.sum(0) + x / prior**2
         held = np.flatnonzero((x <= least) & (g > 0))
@@ -103,7 +108,7 @@ def solve(
     H = curvatures.sum(0) + np.diag(prior**-2)
     inverse = np.linalg.inv(H)
     sandwich = inverse @ (correlated(gradients) + np.diag(prior**-2)) @ inverse
-    return Solution(x, sandwich, inverse, noise, gradients, curvatures, i)
+    return Solution(x, sandwich, inverse, noise, r, done)
 
 
 def correlated(gradients: np.ndarray) -> np.ndarray:

@@ -40,6 +40,10 @@ class Unknown:
     added: bool = False
     """Whether it is added to the value of the file, in place of the logarithm of a factor on it."""
 
+    def absent(self, base: Vehicle) -> bool:
+        """Whether it is an effect that the vehicle file does not have."""
+        return self.field != "" and getattr(base, self.field) is None
+
 
 _TURNS = ("command", "motor", "rotor_speed")
 _ALL = (*_TURNS, "motor_and_rate")
@@ -91,6 +95,8 @@ the thrust that is lost by the end of the flight; logarithm of a factor on the t
 several flights; fraction by which the rotors on the left, at the rear, and with positive spin pull more than the others
 (worn propellers, or a centre of mass that is not in the middle); logarithm of the accelerometer filter's time constant
 divided by `FORCE_FILTER`."""
+UNITS = {"gyro": "rad/s", "force": "m/s^2", "pose": "s", "tilt": "rad", "wind": "m/s"}
+"""Units of the nuisances by the first word of their names. All others have the unit 1."""
 GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED, WIND = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14, slice(15, 17)
 """Indices in `NUISANCES`: of the biases, of the changes of the thrust, and of the accelerometer's filter."""
 FORCE_FILTER = 0.011
@@ -148,7 +154,7 @@ def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
         return False
     if unknown.added or not unknown.field:
         return True
-    value = value_of(base, unknown.field)
+    value = np.asarray(value_of(base, unknown.field))
     return bool(np.any((value[list(unknown.entries)] if unknown.entries else value) != 0))
 
 
@@ -165,7 +171,7 @@ def vehicle_of(base: Vehicle, unknowns: Sequence[Unknown], p: Array) -> Vehicle:
     return dataclasses.replace(base, **changed)
 
 
-def value_of(vehicle: Vehicle, field: str) -> np.ndarray:
+def value_of(vehicle: Vehicle, field: str) -> Any:
     """The value of a field. Terms that the vehicle file does not have: rotors slow down as they speed up; all others
     are zero.
     """
@@ -173,7 +179,7 @@ def value_of(vehicle: Vehicle, field: str) -> np.ndarray:
     if value is None and field == "motor_time_constant_down":
         value = vehicle.motor_time_constant
     shape = next(f.metadata["shape"] for f in (*quantities(), *terms()) if f.name == field)
-    return np.zeros(shape) if value is None else np.asarray(value, float)
+    return np.zeros(shape) if value is None else value
 
 
 def shares(model: Model, q: Array, when: Array) -> Array:

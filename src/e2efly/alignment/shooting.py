@@ -62,6 +62,8 @@ class Fit:
     noise: dict[str, float]
     """Spread of each sensor about the fitted model."""
     iterations: int
+    squares: dict[str, np.ndarray]
+    """By sensor, (windows,): mean square of its residuals. NaN where nothing was measured."""
 
 
 def fit(
@@ -175,7 +177,10 @@ def _fit(
     np.add.at(groups, group, each)
     inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
     sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
-    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, i)
+    left = at(_costs, p, q, starts, noise)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = {name: left[f"square/{name}"] / left[f"sum/{name}"] for name in noise}
+    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, i, squares)
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.alignment.least_squares import Solution, solve
+from e2efly.alignment.misfit import mean_square
 from e2efly.alignment.model import FACTOR, FORCE, NUISANCES, WIND, Model, shares, turned, vehicle_of, wind_of
 from e2efly.alignment.windows import STEP, Windows, on_grid
 from e2efly.control.vectors import Quat, Vec3
@@ -32,10 +33,13 @@ _POSES = [name for name, _ in NUISANCES].index("pose_delay")
 assert _POSES == POSE_DELAY
 
 
-def solved(model: Model, windows: Windows, records: Sequence[Record]) -> tuple[Solution, np.ndarray]:
-    """The unknowns of the vehicle, and the nuisances of each flight, (flights, nuisances).
+def solved(
+    model: Model, windows: Windows, records: Sequence[Record], plain: bool = False
+) -> tuple[Solution, np.ndarray, dict[str, np.ndarray]]:
+    """The unknowns of the vehicle, the nuisances of each flight, (flights, nuisances), and by sensor the mean square of
+    what is left over in each window, (n,).
 
-    The windows must be those of the driver rotor_speed.
+    The windows must be those of the driver rotor_speed. `plain`: the vehicle has nothing that its file lacks.
     """
     flights, u = len(records), len(model.unknowns)
     data, there = measurements(windows, records)
@@ -51,8 +55,10 @@ def solved(model: Model, windows: Windows, records: Sequence[Record]) -> tuple[S
         return jax.vmap(lambda window: _residuals(model, x[:u], q[window["flight"]], window))(data)
 
     with jax.enable_x64(True):
-        found = solve(residuals, data, there, np.zeros(len(prior)), prior, FLOOR)
-    return found, found.x[u:].reshape(flights, -1)
+        held = np.array([x.absent(model.base) and plain for x in model.unknowns] + [False] * prior_q.size)
+        found = solve(residuals, data, there, np.zeros(len(prior)), prior, FLOOR, held=held)
+    squares = {name: mean_square(left, there[name]) for name, left in found.left.items()}
+    return found, found.x[u:].reshape(flights, -1), squares
 
 
 def measurements(windows: Windows, records: Sequence[Record]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -111,8 +111,11 @@ def _identify(options: Identify) -> int:
     write_json(options.out / "identified.json", report)
     console.print(_table(base, fused))
     for each in found.values():
+        for line in _left_over(each):
+            console.print(line, style="dim")
         for refusal in each.refusals:
             console.print(str(refusal), style="dim")
+        _warn(each, console)
     if found and not any(e.name == "mass" for e in said):
         console.print(
             f"mass is the file's, {base.mass:g} kg: flights give thrust, inertia and drag over it. Weigh the vehicle "
@@ -184,6 +187,42 @@ def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", ste
         )
 
 
+def _left_over(found: "Found") -> list[str]:
+    """What each flight had besides the vehicle, and what the fit leaves over, in words."""
+    from e2efly.alignment.identification import nuisances
+    from e2efly.alignment.model import UNITS
+    from e2efly.logs.recording import KINDS
+
+    lines = []
+    for i, flight in enumerate(nuisances(found)):
+        told = [
+            f"{name} {value:.2g} {UNITS.get(name.split('_')[0], '')}".rstrip()
+            for name, value in flight.items()
+            if abs(value) > 1e-4
+        ]
+        lines.append(f"flight {i + 1}: {', '.join(told)}")
+    units = {name: kind.unit for name, kind in KINDS.items()} | {"quaternion": "rad"}
+    for part in found.parts:
+        told = [
+            f"{name.replace('_', ' ')} {value:.2g} {units.get(name, 'rad/s')}" for name, value in part.noise.items()
+        ]
+        lines.append(f"left over (rms): {', '.join(told)}")
+    return lines
+
+
+def _warn(found: "Found", console: Console) -> None:
+    from e2efly.alignment.misfit import widened
+
+    alarms = [each for each in found.misfits if each.alarming]
+    if alarms:
+        console.print(
+            f"The model lacks something that this vehicle has ({'; '.join(map(str, alarms))}). The standard deviations "
+            f"are therefore up to {widened(alarms):.1f} times as large. Rotor speeds in the log, 200 times a second, "
+            "tell forces, rotors and rate loop apart.",
+            style="yellow",
+        )
+
+
 def _with_mass(estimates: "list[Estimate]", said: "Sequence[Estimate]") -> "list[Estimate]":
     """Parameters that are proportional to the mass are not known more precisely than the mass."""
     from dataclasses import replace
@@ -238,7 +277,14 @@ def _report(
                 label: dict(zip((u.name for u in each.model.unknowns), map(float, other), strict=True))
                 for label, other in each.structures.items()
             },
-            "noise": each.fit.noise,
+            "noise": {name: value for part in each.parts for name, value in part.noise.items()},
+            "misfit": [{"sensor": m.sensor, "share": m.share, "growth": m.growth} for m in each.misfits],
+            "response": None
+            if each.response is None
+            else [
+                {"name": u.name, "found": float(x), "sigma": float(off)}
+                for u, x, off in zip(each.response.unknowns, each.response.p, each.response.sigma, strict=True)
+            ],
             "iterations": each.fit.iterations,
             "refused": [str(refusal) for refusal in each.refusals],
             "held_out": {
