@@ -227,8 +227,7 @@ def identify(
     if driver == "rotor_speed":
         return _measured(model, windows, held_out, records, plain)
     found = fit(model, seen, begin(model, seen), told=told)
-    wider = widened(misfits(found, seen, records))
-    sigma = wider * sigmas(model, found)
+    sigma = sigmas(model, found, misfits(found, seen, records))
     impossible = _impossible(model, found.p)
     refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
     p = _given(found.p, whole_covariance(found, sigma), refused)
@@ -237,7 +236,7 @@ def identify(
             break
         # far from the fitted values, the linear correction of `_given` is not valid
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
-        sigma = np.where(refused, sigma, wider * sigmas(model, found))
+        sigma = np.where(refused, sigma, sigmas(model, found, misfits(found, seen, records)))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
         more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
@@ -271,7 +270,7 @@ def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Seq
         squares,
     )  # fmt: skip
     left = misfits(found, seen, records)
-    sigma, source = widened(left) * sigmas(model, found), f"{', '.join(r.path.name for r in records)}; flight"
+    sigma, source = sigmas(model, found, left), f"{', '.join(r.path.name for r in records)}; flight"
     refused, refusals = _vague(model.unknowns, sigma, model.base, plain)
     p = _given(found.p, whole_covariance(found, sigma), refused)
     estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
@@ -280,7 +279,7 @@ def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Seq
         answer, more = responded(model, records, plain)
         off = np.sqrt(np.maximum(np.diag(answer.covariance), np.diag(answer.assumed)))
         off = np.hypot(off, [ROTOR_STRUCTURE.get(x.field, 0.0) for x in RESPONSE])
-        off *= widened(more)
+        off = widened(more, off, np.array([x.prior for x in RESPONSE]))
         left += more
         vague, unsure = _vague(RESPONSE, off, model.base, plain)
         refusals += unsure
@@ -394,13 +393,15 @@ def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.nda
     return out
 
 
-def sigmas(model: Model, found: Fit) -> np.ndarray:
+def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
     """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
-    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
+    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`). What is
+    left over widens them.
     """
     noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     structure = STRUCTURES.get(model.driver, STRUCTURE)
-    return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
+    off = np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
+    return widened(left, off, np.array([u.prior for u in model.unknowns]))
 
 
 def _estimates(

@@ -19,8 +19,10 @@ SHARE = 0.01
 """Share of the motion up to which what is left over counts as noise: no model of a vehicle is better."""
 NORMAL = 0.6745
 """Median of the absolute values of a standard normal distribution."""
-ALARM = 2.0
+ALARM = 1.7
 """Growth of the residuals from which on the model lacks something."""
+WRONG = 2.0
+"""Standard deviation of a parameter, in those from before the flights, over the unexplained share of the motion."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,14 @@ def mean_square(left: np.ndarray, there: np.ndarray) -> np.ndarray:
         return np.asarray(np.sum((left * there) ** 2, 1) / there.sum(1))
 
 
-def widened(misfits: Sequence[Misfit]) -> float:
-    """Factor on all standard deviations: 1 unless something is missing in the model."""
-    return max((each.growth for each in misfits if each.alarming), default=1.0)
+def widened(misfits: Sequence[Misfit], sigma: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """Standard deviations, (u,), as wide as what is left over demands. They are what they were unless something is
+    missing in the model. `prior` has those from before the flights.
+
+    A wrong model is wrong by about the share of the motion that it does not explain, however many samples there are.
+    """
+    alarms = [each for each in misfits if each.alarming]
+    if not alarms:
+        return sigma
+    growth, share = max(each.growth for each in alarms), max(each.share for each in alarms)
+    return np.asarray(np.hypot(growth * sigma, WRONG * share * prior))
