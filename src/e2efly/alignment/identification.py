@@ -9,7 +9,7 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, vehicle_of
+from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, vehicle_of
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
@@ -31,7 +31,6 @@ SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 """The same when motor outputs are logged so rarely that they are interpolated between samples."""
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
-POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
 LEAST = 1.5
 """Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
 refused by its standard deviation."""
@@ -122,7 +121,7 @@ def _shows_motors(record: Record) -> bool:
     return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
-def _volts(records: Sequence[Record]) -> float | None:
+def typical_volts(records: Sequence[Record]) -> float | None:
     """The typical battery voltage of these flights, V. None if one of them has no voltage."""
     if not all(record.has("voltage") for record in records):
         return None
@@ -154,7 +153,7 @@ def identify(
         ValueError: naming the flight and what it lacks.
     """
     driver = driver_of(records, step)
-    volts = _volts(records) if volts is None else volts
+    volts = typical_volts(records) if volts is None else volts
     parts, length = [], LENGTHS.get(driver, LENGTH)
     for number, record in enumerate(records):
         if not record.has("body_rate"):

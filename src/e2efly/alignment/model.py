@@ -82,8 +82,10 @@ the thrust that is lost by the end of the flight; logarithm of a factor on the t
 several flights; fraction by which the rotors on the left, at the rear, and with positive spin pull more than the others
 (worn propellers, or a centre of mass that is not in the middle); logarithm of the accelerometer filter's time constant
 divided by `FORCE_FILTER`."""
-GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14
-"""Indices in `NUISANCES`: of the biases, of the changes of the thrust, and of the accelerometer's filter."""
+GYRO, FORCE, POSE_DELAY, TILT, LOST, FACTOR = slice(0, 3), slice(3, 6), 6, slice(7, 9), 9, 10
+UNEVEN, FILTERED = slice(11, 14), 14
+"""Indices in `NUISANCES`: of the biases, of the poses' delay and tilt, of the changes of the thrust, and of the
+accelerometer's filter."""
 FORCE_FILTER = 0.011
 """Time constant of each of the two stages with which a flight controller filters its accelerometer, s. Together they
 have the same delay as Betaflight's own 10 Hz filter. Without this filter, a fit would find a thrust that rises less
