@@ -9,7 +9,7 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, vehicle_of
+from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, added, vehicle_of
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
@@ -38,7 +38,10 @@ TORQUES = 200.0
 """Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
-values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
+values of the file; beyond it, the fit is repeated. Those standard deviations hold for known refused ones. `REFITS`: the
+largest number of such repetitions."""
+ABOVE_ZERO = 2.0
+"""Standard deviations by which an unknown that the file has as zero must be above it to be taken from the flights."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,17 @@ class Refusal:
     """Standard deviation after the fit, s or relative."""
     impossible: bool = False
     """Whether the fitted value is impossible for a rigid body."""
+    added: float = 0.0
+    """If the file has zero, the unit of `sigma`, in the unit of the file's field."""
 
     def __str__(self) -> str:
         if self.impossible:
             return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
+        if self.added:
+            off = f"{self.sigma * self.added:.2g} {Vehicle.__dataclass_fields__[self.unknown.field].metadata['unit']}"
+            return (
+                f"{self.unknown.name} stays 0, as in the file: the flights show it to +- {off}; fly: {self.unknown.fly}"
+            )
         unit = " s" if self.unknown.field == "latency" else ""
         how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
         return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
@@ -77,6 +87,11 @@ class Found:
     """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
     structures: dict[str, np.ndarray]
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
+
+
+def relative_sigma(found: Found) -> np.ndarray:
+    """Standard deviations of the unknowns, (u,), relative to the value where the file has zero, as elsewhere."""
+    return np.where(added(found.model) > 0, found.sigma / np.maximum(found.p, 1e-12), found.sigma)
 
 
 def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
@@ -183,25 +198,30 @@ def identify(
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
     impossible = _impossible(model, found.p)
-    refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
-    p = _given(found.p, whole_covariance(found, sigma), refused)
+    refused = impossible | _is_vague(model, found.p, sigma)
+    p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
-        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
+        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused]):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
         sigma = np.where(refused, sigma, sigmas(model, found))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
-        more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        more = refused | impossible | _is_vague(model, p, sigma)
         if np.all(more == refused):
             break
-        refused, p = more, _given(found.p, whole_covariance(found, sigma), more)
+        refused = more
+        p, known = _given(found.p, whole_covariance(found, sigma), refused)
     structures = _structures(model, seen, p, refused)
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
-    refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
+    units = added(model)
+    refusals = [
+        Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i]), float(units[i]))
+        for i in np.flatnonzero(refused)
+    ]
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = _estimates(model, p, sigma, refused, source)
     if not step:  # with `step`, the fitted delay from command to response is the result
@@ -268,10 +288,13 @@ def _latency(
     return [Estimate("latency", np.array(total), np.array(off), source)]
 
 
-def _is_vague(unknown: Unknown, sigma: float) -> bool:
-    """Whether the flights say too little about an unknown."""
-    limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
-    return bool(sigma > min(limit, SHOWN * unknown.prior))
+def _is_vague(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """About which unknowns, (u,), the flights say too little."""
+    limits = [
+        min(next((v for name, v in EXACT.items() if u.field.startswith(name)), EXACT_ELSE), SHOWN * u.prior)
+        for u in model.unknowns
+    ]
+    return (sigma > limits) | ((added(model) > 0) & (p < ABOVE_ZERO * sigma))
 
 
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
@@ -286,24 +309,27 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
     return at & (2 * moments[largest] > moments.sum())
 
 
-def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
-    """The unknowns, given that the refused ones are zero (the values of the file). This is the mean of the normal
-    distribution under that condition. The others then no longer compensate for the fitted values of the refused ones.
+def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unknowns, (u,), given that the refused ones are zero (the values of the file), and their standard deviations.
+    These are those of the normal distribution under that condition. The others then no longer compensate for the
+    fitted values of the refused ones.
     """
-    if not refused.any() or refused.all():
-        return np.where(refused, 0.0, p)
-    kept = ~refused
-    moved = covariance[np.ix_(kept, refused)] @ np.linalg.solve(covariance[np.ix_(refused, refused)], -p[refused])
-    out = np.zeros_like(p)
-    out[kept] = p[kept] + moved
-    return out
+    out, sigma = np.where(refused, 0.0, p), np.where(refused, 0.0, np.sqrt(np.diag(covariance)))
+    if refused.any() and not refused.all():
+        kept = ~refused
+        slope = np.linalg.solve(covariance[np.ix_(refused, refused)], covariance[np.ix_(refused, kept)])
+        out[kept] -= p[refused] @ slope
+        left = np.diag(covariance)[kept] - np.sum(covariance[np.ix_(refused, kept)] * slope, 0)
+        sigma[kept] = np.sqrt(np.maximum(left, 0.0))
+    return out, sigma
 
 
 def sigmas(model: Model, found: Fit) -> np.ndarray:
-    """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
-    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
+    """Standard deviations of the unknowns. Each is the largest of three values, the spread between windows, the spread
+    between flights and the effect of white noise, combined as a root sum of squares with the uncertainty of the model
+    itself (`STRUCTURE`).
     """
-    noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    noise = np.maximum(np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed))), found.between)
     structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
     return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
 
@@ -311,7 +337,7 @@ def sigmas(model: Model, found: Fit) -> np.ndarray:
 def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
     """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file."""
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
+    for unknown, x, off, vague, unit in zip(model.unknowns, p, sigma, refused, added(model), strict=True):
         if vague or not unknown.field:
             continue
         base = np.asarray(getattr(model.base, unknown.field), float)
@@ -319,6 +345,8 @@ def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarr
         at = list(unknown.entries) if unknown.entries else ...
         if unknown.field == "latency":
             value[at], spread[at] = base + x, off
+        elif unit:
+            value[at], spread[at] = unit * x, unit * off
         else:
             value[at], spread[at] = base[at] * np.exp(x), np.abs(base[at]) * np.exp(x) * off
         if unknown.field == "thrust_map":  # the largest thrust grows with the map

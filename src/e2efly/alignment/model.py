@@ -71,6 +71,9 @@ UNKNOWNS: tuple[Unknown, ...] = (
 instead: the delay, s; the curve of the motors (the part of the thrust that rises with the square of the output); the
 fraction of the largest thrust at zero output; and the rotors' inertia. The inertia is given by the yaw rate, rad/s,
 that the vehicle gains when all rotors of one spin direction gain the speed of hover, divided by ten."""
+ADDED = {"drag_linear": 0.3, "drag_quadratic": 0.1}
+"""Where the vehicle file has no drag (zero), the unknown is not a factor on it but the drag itself, never negative, in
+this unit times the mass, 1/s and 1/m."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
@@ -139,7 +142,14 @@ def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
     """Whether flights with this driver can show an unknown. A factor on a value of zero has no effect."""
     if driver not in unknown.drivers:
         return False
-    return unknown.field in ("", "latency") or bool(np.any(_entries(base, unknown) != 0))
+    return unknown.field in ("", "latency", *ADDED) or bool(np.any(_entries(base, unknown) != 0))
+
+
+def added(model: Model) -> np.ndarray:
+    """The unit of each unknown that is added to a zero of the vehicle file, (u,), in the unit of its field. Else 0."""
+    units = [ADDED.get(u.field, 0.0) * float(model.base.mass) for u in model.unknowns]
+    zeros = [bool(u.field) and not np.any(_entries(model.base, u)) for u in model.unknowns]
+    return np.where(zeros, units, 0.0)
 
 
 def _entries(vehicle: Vehicle, unknown: Unknown) -> np.ndarray:
@@ -158,7 +168,10 @@ def vehicle_of(model: Model, p: Array) -> Vehicle:
             changed["latency"] = value + x
         elif unknown.entries:
             moved = np.isin(np.arange(value.shape[-1]), unknown.entries)
-            changed[unknown.field] = value * jnp.exp(jnp.where(moved, x, 0.0))
+            unit = ADDED.get(unknown.field, 0.0) * model.base.mass
+            changed[unknown.field] = jnp.where(
+                moved & (value == 0), unit * x, value * jnp.exp(jnp.where(moved, x, 0.0))
+            )
         else:
             changed[unknown.field] = value * jnp.exp(x)
     return dataclasses.replace(model.base, **changed)
