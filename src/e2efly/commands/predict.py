@@ -36,8 +36,8 @@ class Predict:
     believed: str = ""
     """The vehicle that the flight controller was tuned for, if it is not the same: a name or a .toml file."""
     volts: float | None = None
-    """Battery voltage for which the thrust of the file holds, V. Motor outputs are scaled by it. If omitted, the
-    typical voltage of each flight."""
+    """Battery voltage for which the thrust of the file holds, V. Motor outputs are scaled by it. If omitted, the file's
+    `nominal_voltage`, or else the typical voltage of each flight."""
     json: Path | None = None
     """Write the errors of each flight to this file."""
     out: Path = Path("predicted")
@@ -64,12 +64,14 @@ def run(options: Predict) -> int:
         raise ValueError(f"--volts is {options.volts}; accepted: above 0 V")
     vehicle = load_vehicle(options.vehicle)
     believed = load_vehicle(options.believed) if options.believed else None
+    given = vehicle.nominal_voltage if options.volts is None else options.volts
     records = read_checked(options.logs, options.read.reading(), vehicle, console)
     prepare("cpu")
     found = []
     for record in records:
         model = Model.of(vehicle, driver_of([record]), believed)
-        volts = options.volts if options.volts and record.has("voltage") else typical_volts([record])
+        volts = typical_volts([record])
+        volts = volts if volts is None or given is None else float(given)
         with console.status(f"predicting {record.path.name}"):
             p, q = np.zeros(len(model.unknowns)), np.zeros(len(NUISANCES))
             found.append(forecast(model, p, q, record, volts))
