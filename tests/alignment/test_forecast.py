@@ -41,6 +41,7 @@ def outputs(record: Record, every: int) -> Record:
     return dataclasses.replace(record, streams=streams | {"motor": motor})
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("driver", ["command", "rotor_speed"])
 def test_the_vehicle_that_flew_predicts_far_better_than_hold_and_a_wrong_mass_worse(driver: str) -> None:
     flight = flown(FILE, 8.0, PERFECT)
@@ -51,6 +52,7 @@ def test_the_vehicle_that_flew_predicts_far_better_than_hold_and_a_wrong_mass_wo
     assert np.allclose(right["position"][HOLD], wrong["position"][HOLD])
 
 
+@pytest.mark.whole(but=1)
 @pytest.mark.parametrize("every, driver", [(1, "motor"), (5, "motor_and_rate")])
 def test_motor_outputs_drive_a_prediction(every: int, driver: str) -> None:
     """Those that the measured rates turn do not foretell the attitude, which is an input."""

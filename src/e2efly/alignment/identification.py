@@ -198,10 +198,12 @@ def identify(
     found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found)
     impossible = _impossible(model, found.p)
-    refused = impossible | _is_vague(model, found.p, sigma)
+    refused = impossible | _taken_back(model, found.p, sigma)
     p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
-        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused]):
+        unclear = np.any(_is_vague(model, found.p, sigma) & ~refused)
+        near = np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused])
+        if not refused.any() or (near and not unclear):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
         found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
@@ -307,6 +309,18 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
     largest = int(np.argmax(moments))
     at = np.array([u.field == "inertia" and u.entries == (largest,) for u in model.unknowns])
     return at & (2 * moments[largest] > moments.sum())
+
+
+def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Which unknowns, (u,), are refused at first. Of two drags of one axis that the file has as zero, only the less
+    certain: each may be zero if the other is not.
+    """
+    vague, zero = _is_vague(model, p, sigma), added(model) > 0
+    for axis in range(3):
+        both = [i for i, u in enumerate(model.unknowns) if zero[i] and u.entries == (axis,)]
+        if len(both) == 2 and vague[both].all():
+            vague[max(both, key=lambda i: float(p[i] / sigma[i]))] = False
+    return vague
 
 
 def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
