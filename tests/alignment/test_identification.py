@@ -132,6 +132,41 @@ def test_what_is_found_over_the_mass_goes_with_it(found: Found) -> None:
 
 
 @pytest.mark.whole
+def test_drag_that_the_file_does_not_have_is_found_or_named() -> None:
+    """MuJoCo's body has a quadratic drag; the file has none."""
+    record = flown(BODY, 24.0)  # lines there and back, which tell drag from wind
+    bare = dataclasses.replace(
+        FILE, mass=BODY.mass, drag_linear=0 * FILE.drag_linear, drag_quadratic=0 * BODY.drag_linear
+    )
+    found = identify(bare, [record], believed=FILE)
+    vehicle = merged(bare, {e.name: e for e in found.estimates})
+    drag = vehicle.drag_linear * 4 + vehicle.drag_quadratic * 16
+    assert np.allclose(drag[:2], (BODY.drag_linear * 4 + BODY.drag_quadratic * 16)[:2], rtol=0.15)
+    told = {r.unknown.name: str(r) for r in found.refusals}
+    for i, axis in enumerate("xyz"):
+        for name in ("drag_linear", "drag_quadratic"):
+            left = f"{name}_{axis}" in told
+            assert left == (getattr(vehicle, name)[i] == 0)
+            assert (
+                not left
+                or f"{name}_{axis} stays 0, as in the file: the flights show it to +- " in told[f"{name}_{axis}"]
+            )
+    names, matrix = correlation([found], {e.name: e for e in found.estimates}, 0.0)
+    assert np.linalg.eigvalsh(matrix).min() > 0 and np.all(np.abs(matrix) < 1 + 1e-9)
+
+
+@pytest.mark.whole
+def test_flights_that_disagree_widen_sigma() -> None:
+    """Two bodies whose drag differs by a third: what one flight shows does not hold for the other."""
+    smooth = dataclasses.replace(FILE, drag_quadratic=0 * FILE.drag_quadratic)
+    bodies = [dataclasses.replace(smooth, drag_linear=smooth.drag_linear * k) for k in (0.75, 1.25)]
+    found = identify(smooth, [flown(body, 15.0, seed=i) for i, body in enumerate(bodies)])
+    at = [u.name for u in found.model.unknowns].index("drag_linear_x")
+    assert found.sigma[at] > 2 * np.sqrt(found.fit.covariance[at, at])
+    assert found.sigma[at] > 0.1
+
+
+@pytest.mark.whole
 def test_without_rotor_speeds_the_inertia_is_less_sure(record: Record, found: Found) -> None:
     """By commands alone, inertia and rate gain show mostly by their product."""
     streams = {k: s for k, s in record.streams.items() if k != "rotor_speed"}

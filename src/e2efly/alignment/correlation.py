@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found
+from e2efly.alignment.identification import Found, relative_sigma
 from e2efly.alignment.model import Unknown
 from e2efly.vehicles.posterior import ADDED, TOGETHER, Entry
 
@@ -37,7 +37,7 @@ def correlation(
     names: list[str] = []
     blocks: list[np.ndarray] = []
     for each in (part for whole in found for part in whole.parts):
-        covariance, sigma = each.covariance, each.sigma
+        covariance, sigma = each.covariance, relative_sigma(each)
         spread = np.sqrt(np.diag(covariance))
         kept = [
             i for i, u in enumerate(each.unknowns)

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
-from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, value_of, vehicle_of
+from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, from_zero, value_of, vehicle_of
 from e2efly.alignment.response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
@@ -41,7 +42,6 @@ SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
-POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
 LEAST = 1.5
 """Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
 refused by its standard deviation."""
@@ -51,7 +51,10 @@ SURE = 3.0
 """Number of standard deviations from which on an effect that the vehicle file does not have counts as shown."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
-values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
+values of the file; beyond it, the fit is repeated. Those standard deviations hold for known refused ones. `REFITS`: the
+largest number of such repetitions."""
+ABOVE_ZERO = 2.0
+"""Standard deviations by which an unknown that the file has as zero must be above it to be taken from the flights."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,17 @@ class Refusal:
     """Standard deviation after the fit, s or relative."""
     impossible: bool = False
     """Whether the fitted value is impossible for a rigid body."""
+    added: float = 0.0
+    """If the file has zero, the unit of `sigma`, in the unit of the file's field."""
 
     def __str__(self) -> str:
         if self.impossible:
             return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
+        if self.added:
+            off = f"{self.sigma * self.added:.2g} {Vehicle.__dataclass_fields__[self.unknown.field].metadata['unit']}"
+            return (
+                f"{self.unknown.name} stays 0, as in the file: the flights show it to +- {off}; fly: {self.unknown.fly}"
+            )
         unit = " s" if self.unknown.field == "latency" else ""
         how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
         return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
@@ -119,6 +129,11 @@ class Found:
         return (own,) if self.response is None else (own, self.response)
 
 
+def relative_sigma(part: Part) -> np.ndarray:
+    """Standard deviations of the unknowns, (u,), relative to the value where the file has zero, as elsewhere."""
+    return np.where(from_zero(part.base, part.unknowns) > 0, part.sigma / np.maximum(part.p, 1e-12), part.sigma)
+
+
 def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
     """The covariance with these standard deviations and the correlations of the fit."""
     spread = np.sqrt(np.diag(found.covariance))
@@ -163,7 +178,7 @@ def _shows_motors(record: Record) -> bool:
     return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
-def _volts(records: Sequence[Record]) -> float | None:
+def typical_volts(records: Sequence[Record]) -> float | None:
     """The typical battery voltage of these flights, V. None if one of them has no voltage."""
     if not all(record.has("voltage") for record in records):
         return None
@@ -197,7 +212,7 @@ def identify(
         ValueError: naming the flight and what it lacks.
     """
     driver = driver_of(records, step)
-    volts = _volts(records) if volts is None else volts
+    volts = typical_volts(records) if volts is None else volts
     parts, length = [], LENGTHS.get(driver, LENGTH)
     for number, record in enumerate(records):
         if not record.has("body_rate"):
@@ -224,72 +239,80 @@ def identify(
     every = min(HELD_OUT, windows.count)
     held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
+    absent = np.array([plain and unknown.absent(vehicle) for unknown in model.unknowns])
     if driver == "rotor_speed":
-        return _measured(model, windows, held_out, records, plain)
-    found = fit(model, seen, begin(model, seen), told=told)
+        found = solved(model, seen, records, absent)
+    else:
+        found = fit(model, seen, begin(model, seen), told=told)
     sigma = sigmas(model, found, misfits(found, seen, records))
     impossible = _impossible(model, found.p)
-    refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
-    p = _given(found.p, whole_covariance(found, sigma), refused)
+    refused = absent | impossible | _taken_back(model, found.p, sigma)
+    p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
-        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
+        unclear = np.any(_is_vague(model.base, model.unknowns, found.p, sigma) & ~refused)
+        near = np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused])
+        if not refused.any() or (near and not unclear):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
-        found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
+        if driver == "rotor_speed":
+            found = solved(model, seen, records, refused)
+        else:
+            found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
         sigma = np.where(refused, sigma, sigmas(model, found, misfits(found, seen, records)))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
-        more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        more = refused | impossible | _is_vague(model.base, model.unknowns, p, sigma)
         if np.all(more == refused):
             break
-        refused, p = more, _given(found.p, whole_covariance(found, sigma), more)
+        refused = more
+        p, known = _given(found.p, whole_covariance(found, sigma), refused)
     structures = _structures(model, seen, p, refused)
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
-    refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
+    refusals = _refusals(model.base, model.unknowns, sigma, refused & ~absent, impossible)
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
-    if not step:  # with `step`, the fitted delay from command to response is the result
-        at = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
-        answered = None if at is None else (float(model.base.latency) + float(p[at]), float(sigma[at]))
-        seldom = driver == "motor_and_rate"
-        estimates = [e for e in estimates if e.name != "latency"]
-        estimates += _latency(records, found.q, answered if driver == "command" else None, seldom, source)
-    left = tuple(misfits(found, seen, records))
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, misfits=left)
-
-
-def _measured(model: Model, windows: Windows, held_out: np.ndarray, records: Sequence[Record], plain: bool) -> Found:
-    """The identification from rotor speeds: forces and torques, and the response to commands, each by itself."""
-    seen = windows.some(~held_out)
-    solution, q, squares = solved(model, seen, records, plain)
-    u = len(model.unknowns)
-    found = Fit(
-        solution.x[:u], q, solution.covariance[:u, :u], solution.assumed[:u, :u], solution.noise, solution.iterations,
-        squares,
-    )  # fmt: skip
-    left = misfits(found, seen, records)
-    sigma, source = sigmas(model, found, left), f"{', '.join(r.path.name for r in records)}; flight"
-    refused, refusals = _vague(model.unknowns, sigma, model.base, plain)
-    p = _given(found.p, whole_covariance(found, sigma), refused)
-    estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
-    part = answered = None
-    if all(_drives(record, "command") for record in records):
-        answer, more = responded(model, records, plain)
-        off = np.sqrt(np.maximum(np.diag(answer.covariance), np.diag(answer.assumed)))
-        off = np.hypot(off, [ROTOR_STRUCTURE.get(x.field, 0.0) for x in RESPONSE])
-        off = widened(more, off, np.array([x.prior for x in RESPONSE]))
+    left, answer = misfits(found, seen, records), None
+    late = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
+    answered = None if late is None else (float(model.base.latency) + float(p[late]), float(sigma[late]))
+    if driver == "rotor_speed":
+        estimates += _yaw(model, found, sigma, impossible, source)
+    if driver == "rotor_speed" and all(_drives(record, "command") for record in records):
+        answer, more = _answer(model, records, plain)
         left += more
-        vague, unsure = _vague(RESPONSE, off, model.base, plain)
-        refusals += unsure
-        part = Part(model.base, RESPONSE, answer.x, off, answer.covariance, answer.noise)
-        told = {e.name: e for e in _estimates(model.base, RESPONSE, answer.x, off, vague, source)}
-        if (late := told.pop("latency", None)) is not None:
-            answered = float(late.value), float(late.sigma)
-        estimates += told.values()
-    estimates += _latency(records, q, answered, False, source)
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, {}, part, tuple(left))
+        held = np.array([plain and unknown.absent(vehicle) for unknown in RESPONSE])
+        vague = _is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held
+        refusals += _refusals(model.base, RESPONSE, answer.sigma, vague)
+        estimates += _estimates(model.base, RESPONSE, answer.p, answer.sigma, vague | held, source)
+        answered = next(((float(e.value), float(e.sigma)) for e in estimates if e.name == "latency"), None)
+    if not step:  # with `step`, the fitted delay from command to response is the result
+        estimates = [e for e in estimates if e.name != "latency"]
+        by_commands = answered if driver in ("command", "rotor_speed") else None
+        estimates += _latency(records, found.q, by_commands, driver == "motor_and_rate", source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, answer, tuple(left))
+
+
+def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[Part, list[Misfit]]:
+    """What the rotor speeds show of lag, delay and rate loop, and what is left over."""
+    found, left = responded(model, records, plain)
+    off = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    off = np.hypot(off, [ROTOR_STRUCTURE.get(u.field, 0.0) for u in RESPONSE])
+    sigma = widened(left, off, np.array([u.prior for u in RESPONSE]))
+    return Part(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
+
+
+def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, source: str) -> list[Estimate]:
+    """Rotor speeds show the inertia about z over the torque ratio. It counts as inertia, with the file's torque ratio,
+    unless no rigid body has that inertia: then the moment changes as the two others do, and the rest is the ratio's.
+    """
+    at = {u.name: i for i, u in enumerate(model.unknowns)}
+    z = at["inertia_z"]
+    if not impossible[z]:
+        return []
+    others = float(np.log(np.mean(np.exp(found.p[[at["inertia_x"], at["inertia_y"]]]))))
+    ratio = float(model.base.torque_ratio) * float(np.exp(others - found.p[z]))
+    return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * sigma[z]), source)]
 
 
 def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[Misfit]:
@@ -353,19 +376,24 @@ def _latency(
     return [Estimate("latency", np.array(total), np.array(off), source)]
 
 
-def _vague(
-    unknowns: Sequence[Unknown], sigma: np.ndarray, base: Vehicle, plain: bool
-) -> tuple[np.ndarray, list[Refusal]]:
-    """Which unknowns are not taken over, (u,), and the refusals of those that were looked for."""
-    vague = np.array([_is_vague(unknown, off) for unknown, off in zip(unknowns, sigma, strict=True)])
-    held = np.array([plain and unknown.absent(base) for unknown in unknowns])
-    return vague | held, [Refusal(unknowns[i], float(sigma[i])) for i in np.flatnonzero(vague & ~held)]
+def _refusals(
+    base: Vehicle, unknowns: Sequence[Unknown], sigma: np.ndarray, refused: np.ndarray, impossible: Any = False
+) -> list[Refusal]:
+    units, impossible = from_zero(base, unknowns), np.broadcast_to(impossible, refused.shape)
+    return [
+        Refusal(unknowns[i], float(sigma[i]), bool(impossible[i]), float(units[i]))
+        for i in np.flatnonzero(refused)
+        if unknowns[i].field
+    ]
 
 
-def _is_vague(unknown: Unknown, sigma: float) -> bool:
-    """Whether the flights say too little about an unknown."""
-    limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
-    return bool(sigma > min(np.inf if unknown.added and unknown.field not in EXACT else limit, SHOWN * unknown.prior))
+def _is_vague(base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """About which unknowns, (u,), the flights say too little."""
+    limits = []
+    for u in unknowns:
+        exact = next((v for name, v in EXACT.items() if u.field.startswith(name)), np.inf if u.added else EXACT_ELSE)
+        limits.append(min(exact, SHOWN * u.prior))
+    return (sigma > limits) | ((from_zero(base, unknowns) > 0) & (p < ABOVE_ZERO * sigma))
 
 
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
@@ -380,25 +408,39 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
     return at & (2 * moments[largest] > moments.sum())
 
 
-def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
-    """The unknowns, given that the refused ones are zero (the values of the file). This is the mean of the normal
-    distribution under that condition. The others then no longer compensate for the fitted values of the refused ones.
+def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Which unknowns, (u,), are refused at first. Of two drags of one axis that the file has as zero, only the less
+    certain: each may be zero if the other is not.
     """
-    if not refused.any() or refused.all():
-        return np.where(refused, 0.0, p)
-    kept = ~refused
-    moved = covariance[np.ix_(kept, refused)] @ np.linalg.solve(covariance[np.ix_(refused, refused)], -p[refused])
-    out = np.zeros_like(p)
-    out[kept] = p[kept] + moved
-    return out
+    vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
+    for axis in range(3):
+        both = [i for i, u in enumerate(model.unknowns) if zero[i] and u.entries == (axis,)]
+        if len(both) == 2 and vague[both].all():
+            vague[max(both, key=lambda i: float(p[i] / sigma[i]))] = False
+    return vague
+
+
+def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unknowns, (u,), given that the refused ones are zero (the values of the file), and their standard deviations.
+    These are those of the normal distribution under that condition. The others then no longer compensate for the
+    fitted values of the refused ones.
+    """
+    out, sigma = np.where(refused, 0.0, p), np.where(refused, 0.0, np.sqrt(np.diag(covariance)))
+    if refused.any() and not refused.all():
+        kept = ~refused
+        slope = np.linalg.solve(covariance[np.ix_(refused, refused)], covariance[np.ix_(refused, kept)])
+        out[kept] -= p[refused] @ slope
+        left = np.diag(covariance)[kept] - np.sum(covariance[np.ix_(refused, kept)] * slope, 0)
+        sigma[kept] = np.sqrt(np.maximum(left, 0.0))
+    return out, sigma
 
 
 def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
-    """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
-    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`). What is
-    left over widens them.
+    """Standard deviations of the unknowns. Each is the largest of three values, the spread between windows, the spread
+    between flights and the effect of white noise, combined as a root sum of squares with the uncertainty of the model
+    itself (`STRUCTURES`). What is left over widens them.
     """
-    noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    noise = np.maximum(np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed))), found.between)
     structure = STRUCTURES.get(model.driver, STRUCTURE)
     off = np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
     return widened(left, off, np.array([u.prior for u in model.unknowns]))
@@ -412,7 +454,7 @@ def _estimates(
     """
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     shown = [u.field for u, x, off in zip(unknowns, p, sigma, strict=True) if abs(x) > SURE * off]
-    for unknown, x, off, vague in zip(unknowns, p, sigma, refused, strict=True):
+    for unknown, x, off, vague, unit in zip(unknowns, p, sigma, refused, from_zero(base, unknowns), strict=True):
         absent = unknown.field and getattr(base, unknown.field) is None
         if vague or not unknown.field or (absent and unknown.added and unknown.field not in shown):
             continue
@@ -422,6 +464,8 @@ def _estimates(
         at = list(unknown.entries) if unknown.entries else ...
         if unknown.added:
             value[at], spread[at] = own[at] + x, off
+        elif unit:
+            value[at], spread[at] = unit * x, unit * off
         else:
             value[at], spread[at] = own[at] * np.exp(x), np.abs(own[at]) * np.exp(x) * off
         if unknown.field == "thrust_map":  # the largest thrust grows with the map

@@ -39,6 +39,12 @@ class Solution:
     """Root mean square of the residuals of each sensor."""
     left: dict[str, np.ndarray]
     """By sensor, (groups, rows): the residuals, in its unit."""
+    gradients: np.ndarray
+    """(groups, k) of each group, without the prior."""
+    curvatures: np.ndarray
+    """(groups, k, k) of each group, without the prior."""
+    prior: np.ndarray
+    """(k,) standard deviations about zero."""
     iterations: int
 
 
@@ -108,7 +114,22 @@ def solve(
     H = curvatures.sum(0) + np.diag(prior**-2)
     inverse = np.linalg.inv(H)
     sandwich = inverse @ (correlated(gradients) + np.diag(prior**-2)) @ inverse
-    return Solution(x, sandwich, inverse, noise, r, done)
+    return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, prior, done)
+
+
+def between(found: Solution, part: np.ndarray) -> np.ndarray:
+    """Standard deviations, (k,), by the jackknife over parts of the data: each is left out in turn, and the others take
+    one step. `part` is the number of the part that each group belongs to, (groups,). Zeros for one part.
+    """
+    parts = np.unique(part)
+    if len(parts) < 2:
+        return np.zeros(len(found.x))
+    stiff, pulled = np.diag(found.prior**-2), found.x / found.prior**2
+    steps = [
+        np.linalg.solve(found.curvatures[part != one].sum(0) + stiff, found.gradients[part != one].sum(0) + pulled)
+        for one in parts
+    ]
+    return np.asarray(np.sqrt((len(parts) - 1) * np.var(steps, axis=0)))
 
 
 def correlated(gradients: np.ndarray) -> np.ndarray:

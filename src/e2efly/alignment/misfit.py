@@ -15,6 +15,8 @@ from scipy.optimize import nnls
 
 BINS = 6
 """Most groups of windows of similar motion. In each the median counts: gusts and outliers are in few windows."""
+CALM = 2.0
+"""Motion over white noise, both squared, up to which a window is calm."""
 SHARE = 0.01
 """Share of the motion up to which what is left over counts as noise: no model of a vehicle is better."""
 NORMAL = 0.6745
@@ -58,14 +60,16 @@ def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) ->
     """
     known = np.isfinite(square) & np.isfinite(motion)
     square, motion = square[known], motion[known]
-    many = min(BINS, len(square) // 3)
-    if many < 2:
+    # where nothing but noise moves a sensor, its motion and what is left over are the same noise
+    order = np.argsort(motion)
+    calm, lively = np.split(order, [np.searchsorted(motion[order] ** 2, CALM * white**2)])
+    bins = [calm] * (len(calm) > 2) + np.array_split(lively, min(BINS, len(lively) // 3) or 1)
+    if len(lively) < 3 or len(bins) < 2:
         return Misfit(sensor, 0.0, 1.0)
-    bins = np.array_split(np.argsort(motion), many)
     left = np.array([np.median(square[i]) for i in bins])
     moved = np.array([np.median(motion[i]) for i in bins]) ** 2
-    table = np.stack([np.ones(many), moved], -1)
-    (noise, share), _ = nnls(table / left[:, None], np.ones(many))  # relative errors count alike
+    table = np.stack([np.ones(len(bins)), moved], -1)
+    (noise, share), _ = nnls(table / left[:, None], np.ones(len(bins)))  # relative errors count alike
     tolerated = SHARE**2 * moved[-1]
     calm, least = noise + tolerated, min(white**2, noise) + tolerated
     growth = np.sqrt((noise + share * moved[-1]) / np.sqrt(calm * least))

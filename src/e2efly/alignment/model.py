@@ -83,6 +83,9 @@ UNKNOWNS: tuple[Unknown, ...] = (
 instead: the delay, s; the curve of the motors (the part of the thrust that rises with the square of the output); the
 fraction of the largest thrust at zero output; and the rotors' inertia. The inertia is given by the yaw rate, rad/s,
 that the vehicle gains when all rotors of one spin direction gain the speed of hover, divided by ten."""
+FROM_ZERO = {"drag_linear": 0.3, "drag_quadratic": 0.1}
+"""Where the vehicle file has no drag (zero), the unknown is not a factor on it but the drag itself, never negative, in
+this unit times the mass, 1/s and 1/m."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
@@ -97,8 +100,10 @@ several flights; fraction by which the rotors on the left, at the rear, and with
 divided by `FORCE_FILTER`."""
 UNITS = {"gyro": "rad/s", "force": "m/s^2", "pose": "s", "tilt": "rad", "wind": "m/s"}
 """Units of the nuisances by the first word of their names. All others have the unit 1."""
-GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED, WIND = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14, slice(15, 17)
-"""Indices in `NUISANCES`: of the biases, of the changes of the thrust, and of the accelerometer's filter."""
+GYRO, FORCE, POSE_DELAY, TILT, LOST, FACTOR = slice(0, 3), slice(3, 6), 6, slice(7, 9), 9, 10
+UNEVEN, FILTERED, WIND = slice(11, 14), 14, slice(15, 17)
+"""Indices in `NUISANCES`: of the biases, of the poses' delay and tilt, of the changes of the thrust, of the
+accelerometer's filter, and of the wind."""
 FORCE_FILTER = 0.011
 """Time constant of each of the two stages with which a flight controller filters its accelerometer, s. Together they
 have the same delay as Betaflight's own 10 Hz filter. Without this filter, a fit would find a thrust that rises less
@@ -152,10 +157,18 @@ def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
     """Whether flights with this driver can show an unknown. A factor on a value of zero has no effect."""
     if driver not in unknown.drivers:
         return False
-    if unknown.added or not unknown.field:
-        return True
+    return unknown.added or unknown.field in ("", *FROM_ZERO) or not _is_zero(base, unknown)
+
+
+def from_zero(base: Vehicle, unknowns: Sequence[Unknown]) -> np.ndarray:
+    """The unit of each unknown that is a drag which the file has as zero, (u,), in the unit of its field. Else 0."""
+    units = [FROM_ZERO.get(u.field, 0.0) * float(base.mass) for u in unknowns]
+    return np.where([u.field in FROM_ZERO and _is_zero(base, u) for u in unknowns], units, 0.0)
+
+
+def _is_zero(base: Vehicle, unknown: Unknown) -> bool:
     value = np.asarray(value_of(base, unknown.field))
-    return bool(np.any((value[list(unknown.entries)] if unknown.entries else value) != 0))
+    return not np.any(value[list(unknown.entries)] if unknown.entries else value)
 
 
 def vehicle_of(base: Vehicle, unknowns: Sequence[Unknown], p: Array) -> Vehicle:
@@ -167,7 +180,10 @@ def vehicle_of(base: Vehicle, unknowns: Sequence[Unknown], p: Array) -> Vehicle:
         value = jnp.asarray(changed.get(unknown.field, value_of(base, unknown.field)))
         moved = np.isin(np.arange(value.shape[-1]), unknown.entries) if unknown.entries else np.ones(value.shape, bool)
         by = jnp.where(moved, x, 0.0)
-        changed[unknown.field] = value + by if unknown.added else value * jnp.exp(by)
+        new = value + by if unknown.added else value * jnp.exp(by)
+        if unknown.field in FROM_ZERO:
+            new = jnp.where(moved & (value == 0), FROM_ZERO[unknown.field] * base.mass * x, new)
+        changed[unknown.field] = new
     return dataclasses.replace(base, **changed)
 
 

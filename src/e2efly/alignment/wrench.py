@@ -13,9 +13,23 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.alignment.least_squares import Solution, solve
+from e2efly.alignment.least_squares import between, solve
 from e2efly.alignment.misfit import mean_square
-from e2efly.alignment.model import FACTOR, FORCE, NUISANCES, WIND, Model, shares, turned, vehicle_of, wind_of
+from e2efly.alignment.model import (
+    FACTOR,
+    FORCE,
+    NUISANCES,
+    POSE_DELAY,
+    TILT,
+    WIND,
+    Model,
+    from_zero,
+    shares,
+    turned,
+    vehicle_of,
+    wind_of,
+)
+from e2efly.alignment.shooting import Fit
 from e2efly.alignment.windows import STEP, Windows, on_grid
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.logs.recording import Record
@@ -28,18 +42,12 @@ SHORT = 10
 """Steps over which the angular acceleration is summed up. The noise of the rotor speeds adds up, too."""
 FLOOR = {"body_rate": 2e-3, "specific_force": 0.02, "velocity": 2e-3}
 """The smallest spread of each sensor, in its unit."""
-POSE_DELAY, TILT = 6, slice(7, 9)
-_POSES = [name for name, _ in NUISANCES].index("pose_delay")
-assert _POSES == POSE_DELAY
 
 
-def solved(
-    model: Model, windows: Windows, records: Sequence[Record], plain: bool = False
-) -> tuple[Solution, np.ndarray, dict[str, np.ndarray]]:
-    """The unknowns of the vehicle, the nuisances of each flight, (flights, nuisances), and by sensor the mean square of
-    what is left over in each window, (n,).
+def solved(model: Model, windows: Windows, records: Sequence[Record], fixed: np.ndarray) -> Fit:
+    """The unknowns of the vehicle and the nuisances of each flight. Those unknowns that are `fixed`, (u,), are zero.
 
-    The windows must be those of the driver rotor_speed. `plain`: the vehicle has nothing that its file lacks.
+    The windows must be those of the driver rotor_speed.
     """
     flights, u = len(records), len(model.unknowns)
     data, there = measurements(windows, records)
@@ -49,20 +57,25 @@ def solved(
     if "velocity" not in there:
         prior_q[:, FORCE], prior_q[:, WIND] = 1e-6, 1e-6  # neither can be told from the thrust
     prior = np.concatenate([[x.prior for x in model.unknowns], prior_q.ravel()])
-
-    def residuals(x: Array, data: dict[str, Any]) -> dict[str, Array]:
-        q = x[u:].reshape(flights, -1)
-        return jax.vmap(lambda window: _residuals(model, x[:u], q[window["flight"]], window))(data)
-
+    least, held = np.full(len(prior), -np.inf), np.zeros(len(prior), bool)
+    least[:u][from_zero(model.base, model.unknowns) > 0] = 0.0
+    held[:u] = fixed
     with jax.enable_x64(True):
-        held = np.array([x.absent(model.base) and plain for x in model.unknowns] + [False] * prior_q.size)
-        found = solve(residuals, data, there, np.zeros(len(prior)), prior, FLOOR, held=held)
-    squares = {name: mean_square(left, there[name]) for name, left in found.left.items()}
-    return found, found.x[u:].reshape(flights, -1), squares
+        found = solve(_residuals, (model, data), there, np.zeros(len(prior)), prior, FLOOR, least, held)
+    return Fit(
+        found.x[:u],
+        found.x[u:].reshape(flights, -1),
+        found.covariance[:u, :u],
+        found.assumed[:u, :u],
+        between(found, windows.flight)[:u],
+        found.noise,
+        found.iterations,
+        {name: mean_square(left, there[name]) for name, left in found.left.items()},
+    )
 
 
 def measurements(windows: Windows, records: Sequence[Record]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The data of `_residuals`, and by sensor which of its rows were measured."""
+    """The windows of `_residuals`, and by sensor which of its rows were measured."""
     n, m = windows.count, windows.steps
     grid = windows.begin[:, None] + STEP * np.arange(m + 1)
     data: dict[str, Any] = {
@@ -92,7 +105,15 @@ def measurements(windows: Windows, records: Sequence[Record]) -> tuple[dict[str,
     return data, {name: np.repeat(mask, 3, axis=1).astype(float) for name, mask in there.items()}
 
 
-def _residuals(model: Model, p: Array, q: Array, window: dict[str, Any]) -> dict[str, Array]:
+def _residuals(x: Array, data: tuple[Model, dict[str, Any]]) -> dict[str, Array]:
+    """Of all windows, by sensor, (n, rows)."""
+    model, windows = data
+    u = len(model.unknowns)
+    q = x[u:].reshape(-1, len(NUISANCES))
+    return jax.vmap(lambda window: _of_window(model, x[:u], q[window["flight"]], window))(windows)
+
+
+def _of_window(model: Model, p: Array, q: Array, window: dict[str, Any]) -> dict[str, Array]:
     """Of one window, by sensor, (rows,): x, y and z of each point."""
     vehicle = vehicle_of(model.base, model.unknowns, p)
     plant = Airframe.of(vehicle, STEP, shares(model, q, window["when"]))

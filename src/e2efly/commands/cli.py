@@ -28,6 +28,7 @@ _EXAMPLES = {
     "hil POLICY": "put a real vehicle into a virtual world: poses in, images out",
     "fly-report LOG": "draw a flight",
     "identify flight LOG": "a vehicle file from flights, parts, a pendulum, a thrust stand",
+    "predict LOG --vehicle FILE": "how well a vehicle file predicts a flight, beside trivial predictions",
     "build PARTS.toml": "from a list of parts to a vehicle file and the policies of six tasks",
     "tune LOG --task race": "from logs of your vehicle to a policy for it",
     "align LOG": "fit delay and rate loop to a flight, lay its replay over it",

@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.log_options import LogOptions, show_notes
+from e2efly.commands.log_options import LogOptions, read_checked
 from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.names import unknown
 from e2efly.config.storage import held, write_json
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate
     from e2efly.alignment.identification import Found
     from e2efly.alignment.prediction import Prediction
-    from e2efly.logs.readers import LogReading
     from e2efly.logs.recording import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
@@ -91,7 +90,7 @@ def _identify(options: Identify) -> int:
     for kind in ("flight", "step"):
         if files[kind]:
             known = merged(base, fuse(said))
-            records = _records(files[kind], reading, known, console)
+            records = read_checked(files[kind], reading, known, console)
             found[kind] = _flown(known, base, records, kind == "step", console)
             said += _with_mass(found[kind].estimates, said)
     fused = fuse(said)
@@ -155,21 +154,6 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
     if not any(files.values()):
         raise ValueError(f"sources are missing; accepted: {' FILE, '.join(KINDS)} FILE, any of them")
     return files
-
-
-def _records(files: Sequence[Path], reading: "LogReading", vehicle: Vehicle, console: Console) -> "list[Record]":
-    from e2efly.alignment.checks import checked
-    from e2efly.logs.blackbox_merge import with_blackboxes
-    from e2efly.logs.readers import read_part
-
-    read = with_blackboxes([record for path in files for record in read_part(path, reading)])
-    show_notes(read, console)
-    records = checked(read, vehicle)
-    show_notes(records, console, read)
-    for record in records:
-        rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
-        console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}")
-    return records
 
 
 def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", step: bool, console: Console) -> "Found":
@@ -302,7 +286,7 @@ def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
 
     table = headed("parameter", "file", "identified", "sigma", "source")
     for name, e in fused.items():
-        own = np.atleast_1d(np.asarray(getattr(base, name), float))
+        own = np.broadcast_to(np.asarray(getattr(base, name), float), np.atleast_1d(e.value).shape)  # None: NaN
         for i, (before, value, sigma) in enumerate(
             zip(own.flat, np.atleast_1d(e.value).flat, np.atleast_1d(e.sigma).flat, strict=True)
         ):
@@ -310,7 +294,7 @@ def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
                 label = name if own.size == 1 else f"{name}[{i}]"
                 table.add_row(
                     label,
-                    f"{before:.4g}",
+                    f"{before:.4g}" if np.isfinite(before) else "none",
                     f"{value:.4g}",
                     percent(sigma / abs(value)) if value else f"{sigma:.2g}",
                     e.source,
