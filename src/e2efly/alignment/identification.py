@@ -9,7 +9,7 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, added, vehicle_of
+from e2efly.alignment.model import ADDED, NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, added, vehicle_of
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
@@ -312,14 +312,14 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
 
 def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Which unknowns, (u,), are refused at first. Of two drags of one axis that the file has as zero, only the less
-    certain: each may be zero if the other is not.
+    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only that
+    is refused which the file has as zero, or the less certain of two zeros.
     """
     vague, zero = _is_vague(model, p, sigma), added(model) > 0
     for axis in range(3):
-        both = [i for i, u in enumerate(model.unknowns) if zero[i] and u.entries == (axis,)]
-        if len(both) == 2 and vague[both].all():
-            vague[max(both, key=lambda i: float(p[i] / sigma[i]))] = False
+        both = [i for i, u in enumerate(model.unknowns) if u.field in ADDED and u.entries == (axis,)]
+        if len(both) == 2 and vague[both].all() and zero[both].any():
+            vague[max(both, key=lambda i: (not zero[i], float(p[i] / sigma[i])))] = False
     return vague
 
 
