@@ -11,7 +11,17 @@ import numpy as np
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
-from e2efly.alignment.model import NUISANCES, POSE_DELAY, UNKNOWNS, Model, Unknown, from_zero, value_of, vehicle_of
+from e2efly.alignment.model import (
+    FROM_ZERO,
+    NUISANCES,
+    POSE_DELAY,
+    UNKNOWNS,
+    Model,
+    Unknown,
+    from_zero,
+    value_of,
+    vehicle_of,
+)
 from e2efly.alignment.response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
@@ -409,14 +419,14 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
 
 def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Which unknowns, (u,), are refused at first. Of two drags of one axis that the file has as zero, only the less
-    certain: each may be zero if the other is not.
+    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only that
+    is refused which the file has as zero, or the less certain of two zeros.
     """
     vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
     for axis in range(3):
-        both = [i for i, u in enumerate(model.unknowns) if zero[i] and u.entries == (axis,)]
-        if len(both) == 2 and vague[both].all():
-            vague[max(both, key=lambda i: float(p[i] / sigma[i]))] = False
+        both = [i for i, u in enumerate(model.unknowns) if u.field in FROM_ZERO and u.entries == (axis,)]
+        if len(both) == 2 and vague[both].all() and zero[both].any():
+            vague[max(both, key=lambda i: (not zero[i], float(p[i] / sigma[i])))] = False
     return vague
 
 

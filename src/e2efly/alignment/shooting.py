@@ -143,7 +143,7 @@ def _fit(
     def total(p: np.ndarray, q: np.ndarray, costs: np.ndarray) -> float:
         return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
 
-    damping, i = 1e-3, 0
+    damping, i, held = 1e-3, 0, np.zeros(0, int)
     at = partial(_at, model, data, free)
     cost = total(p, q, at(_costs, p, q, starts, noise)["cost"])
     terms = at(_slopes, p, q, starts, noise)
