@@ -419,8 +419,8 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
 
 def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only that
-    is refused which the file has as zero, or the less certain of two zeros.
+    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only the
+    one is refused that the file has as zero, or the less certain of two zeros.
     """
     vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
     for axis in range(3):
@@ -451,8 +451,9 @@ def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
     itself (`STRUCTURES`). What is left over widens them.
     """
     noise = np.maximum(np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed))), found.between)
-    structure = STRUCTURES.get(model.driver, STRUCTURE)
-    off = np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
+    structure, size = STRUCTURES.get(model.driver, STRUCTURE), np.abs(found.p)
+    scale = np.where(from_zero(model.base, model.unknowns) > 0, size, 1.0)  # relative, of what is no logarithm too
+    off = np.hypot(noise, scale * [structure.get(u.field, 0.0) for u in model.unknowns])
     return widened(left, off, np.array([u.prior for u in model.unknowns]))
 
 
