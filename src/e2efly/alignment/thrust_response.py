@@ -1,0 +1,157 @@
+"""The response of the thrust to its command: gain, delay and a first-order lag, fitted to the accelerometer.
+
+The specific force along body z is g F(s) exp(-s d) / (1 + s T) of the commanded thrust over mass. F is the
+accelerometer's filter of the flight controller, two equal first-order stages. A log of unfiltered forces makes them
+short. Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+
+from e2efly.alignment.model import FORCE_FILTER
+from e2efly.alignment.shooting import FLOOR, HUBER
+from e2efly.alignment.windows import LENGTH
+from e2efly.logs.blackbox_merge import DELAY_SIGMA
+from e2efly.logs.recording import Record, Stream
+
+GRID = 0.001
+"""Step in time of the simulated response, s."""
+CHANGES = 0.5
+"""Root mean square of the changes of the commanded thrust within a second that a fit needs, m/s^2."""
+EXACT = 0.15
+"""Largest standard deviation of a lag that is used, relative."""
+FLY = "steps of thrust of 3 m/s^2 and more, 0.2 s and longer each, three of them or more"
+FILTER_SPREAD, UNFILTERED = 0.7, 1e-4
+"""Standard deviation of the logarithm of the filter's time constant before the fit; and the time constant that stands
+for no filter, s."""
+LATEST = 0.25
+"""Longest delay and lag that are tried, s."""
+
+
+@dataclass(frozen=True)
+class ThrustResponse:
+    """What the thrust gave for what was asked, with standard deviations."""
+
+    gain: tuple[float, float]
+    """Measured over commanded."""
+    lag: tuple[float, float]
+    """Time constant, s."""
+    delay: tuple[float, float]
+    """From the sending of a command, s."""
+    filter: float
+    """Time constant of each of the two stages of the accelerometer's filter, s."""
+    reason: str = ""
+    """Why the lag is not to be believed. Empty: it is."""
+
+
+def thrust_response(records: Sequence[Record], lag: float, delay: float | None = None) -> ThrustResponse | None:
+    """The response of the thrust in flights with commands and accelerometer. None: no flight has both, or no command
+    tells the thrust.
+
+    Args:
+        records: the flights, checked.
+        lag: the time constant from which the fit begins, s.
+        delay: the delay from a command to the motors, s, if it is known.
+    """
+    told = [r for r in records if r.has("command", "specific_force")]
+    told = [r for r in told if np.ptp(r.streams["command"].values[:, 0]) > 0]
+    if not told:
+        return None
+    pairs = [(r.streams["command"], r.streams["specific_force"]) for r in told]
+    seen = np.concatenate([_inside(command, force)[1] for command, force in pairs])
+
+    def foretold(p: np.ndarray) -> np.ndarray:
+        return np.concatenate([_foretold(p, command, _inside(command, force)[0]) for command, force in pairs])
+
+    late = 0.02 if delay is None else delay
+    free = np.array([1.0, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD])
+    fits = []
+    for stage in (FORCE_FILTER, UNFILTERED):  # a log has the filter, or has none
+        p0 = np.array([1.0, np.log(lag), late, np.log(stage)])
+        kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3]
+        fits.append(_fit(foretold, seen, p0, kept))
+    (p, jacobian, rest), _ = min(fits, key=lambda fit: fit[1])
+    group = np.floor(np.concatenate([_inside(*pair)[0] for pair in pairs]) / LENGTH).astype(int)
+    sigma = np.sqrt(np.diag(_covariance(jacobian, rest, group)))
+    changes = float(np.sqrt(np.mean([_changes(command) ** 2 for command, _ in pairs])))
+    reason = ""
+    if changes < CHANGES:
+        reason = f"the commanded thrust changes by {changes:.2g} m/s^2 rms within a second, needed {CHANGES:g}"
+    elif sigma[1] > EXACT:
+        reason = f"+- {100 * sigma[1]:.0f} %"
+    constant = float(np.exp(p[1]))
+    return ThrustResponse(
+        (float(p[0]), float(sigma[0])), (constant, constant * float(sigma[1])), (float(p[2]), float(sigma[2])),
+        float(np.exp(p[3])), reason,
+    )  # fmt: skip
+
+
+def _fit(
+    foretold: Callable[[np.ndarray], np.ndarray], seen: np.ndarray, p0: np.ndarray, free: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
+    """Values, Jacobian and residuals over the spread, the last rows of both being the prior's; and the cost."""
+    p, noise, cost = p0, 1.0, np.inf
+    for _ in range(3):
+        scale = noise
+
+        def left(p: np.ndarray, scale: float = scale) -> np.ndarray:
+            return np.concatenate([(foretold(p) - seen) / scale, (p - p0) / free])
+
+        found = least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=[0.01, 0.1, 0.002, 0.1])
+        p = found.x
+        noise = max(float(1.4826 * np.median(np.abs(foretold(p) - seen))), FLOOR["specific_force"])
+        cost = float(found.cost + len(seen) * np.log(scale))
+    return (p, found.jac, left(p)), cost
+
+
+def _covariance(jacobian: np.ndarray, rest: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """The sandwich estimate over windows, which also holds if neighbouring residuals are alike. Never less than that of
+    white residuals.
+    """
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    scores, prior = jacobian[: len(group)] * np.clip(rest[: len(group)], -HUBER, HUBER)[:, None], jacobian[len(group) :]
+    sums = np.zeros((int(group.max()) + 1, jacobian.shape[1]))
+    np.add.at(sums, group, scores)
+    sandwich = inverse @ (sums.T @ sums + prior.T @ prior) @ inverse
+    wider = np.maximum(np.sqrt(np.diag(inverse) / np.diag(sandwich)), 1.0)
+    return sandwich * np.outer(wider, wider)
+
+
+
+
+def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
+    """The samples that the commands drive: times, s, and specific force along body z, m/s^2."""
+    inside = force.during(command.time[0] + LATEST, command.time[-1])
+    return inside.time, inside.values[:, 2]
+
+
+def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
+    gain, lag, late, stage = p[0], np.exp(p[1]), p[2], np.exp(p[3])
+    grid = np.arange(command.time[0], time[-1] + GRID, GRID)
+    area = np.concatenate([[0.0], np.cumsum(command.values[:-1, 0] * np.diff(command.time))])
+    until = np.interp(grid - late, command.time, area)
+    until += np.maximum(grid - late - command.time[-1], 0) * command.values[-1, 0]
+    until += np.minimum(grid - late - command.time[0], 0) * command.values[0, 0]
+    force = np.diff(until, prepend=until[0] - GRID * command.values[0, 0]) / GRID
+    for constant in (lag, stage, stage):
+        force = lagged(force, constant, GRID)
+    return gain * np.interp(time, grid, force)
+
+
+def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
+    """Values, (..., t), after a first-order lag, s, on a grid of a step, s, beginning at rest."""
+    kept = np.exp(-step / max(constant, 1e-6))
+    begin = kept * values[..., :1]
+    return lfilter([1 - kept], [1, -kept], values, zi=begin)[0]
+
+
+def _changes(command: Stream) -> float:
+    """Root mean square of the changes of the commanded thrust within a second, m/s^2."""
+    grid = np.arange(command.time[0], command.time[-1], 0.01)
+    held = command.values[np.searchsorted(command.time, grid, side="right") - 1, 0]
+    mean = np.convolve(np.pad(held, 50, mode="edge"), np.ones(101) / 101, "valid")
+    return float(np.std(held - mean))
