@@ -146,9 +146,7 @@ def test_a_fence_without_room_is_refused_by_name(fence: dict[str, object], said:
         ({}, {"rate": 7.0}, r"steps\.rate is 7"),
     ],
 )
-def test_steps_without_room_are_refused_by_name(
-    fence: dict[str, object], options: dict[str, float], said: str
-) -> None:
+def test_steps_without_room_are_refused_by_name(fence: dict[str, object], options: dict[str, float], said: str) -> None:
     settings = dataclasses.replace(SETTINGS, fence=dataclasses.replace(Fence(), **fence))
     with pytest.raises(ValueError, match=said):
         excitation(FILE, settings, StepsOptions(**options))

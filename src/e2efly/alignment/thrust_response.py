@@ -1,8 +1,8 @@
 """The response of the thrust to its command: gain, delay and a first-order lag, fitted to the accelerometer.
 
-The specific force along body z is g F(s) exp(-s d) / (1 + s T) of the commanded thrust over mass. F is the
-accelerometer's filter of the flight controller, two equal first-order stages. A log of unfiltered forces makes them
-short. Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964).
+The rotors' speed, whose square the thrust is, follows its command after a delay and with a first-order lag, as in the
+physics. The flight controller filters its accelerometer by two equal first-order stages; other logs are unfiltered.
+Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,6 +17,7 @@ from e2efly.alignment.shooting import FLOOR, HUBER
 from e2efly.alignment.windows import LENGTH
 from e2efly.logs.blackbox_merge import DELAY_SIGMA
 from e2efly.logs.recording import Record, Stream
+from e2efly.vehicles.gravity import GRAVITY
 
 GRID = 0.001
 """Step in time of the simulated response, s."""
@@ -28,6 +29,8 @@ FLY = "steps of thrust of 3 m/s^2 and more, 0.2 s and longer each, three of them
 FILTER_SPREAD, UNFILTERED = 0.7, 1e-4
 """Standard deviation of the logarithm of the filter's time constant before the fit; and the time constant that stands
 for no filter, s."""
+BIAS = 0.1
+"""Standard deviation of the accelerometer's bias, m/s^2. A fit cannot tell it from the gain."""
 LATEST = 0.25
 """Longest delay and lag that are tried, s."""
 
@@ -85,9 +88,12 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
         reason = f"+- {100 * sigma[1]:.0f} %"
     constant = float(np.exp(p[1]))
     return ThrustResponse(
-        (float(p[0]), float(sigma[0])), (constant, constant * float(sigma[1])), (float(p[2]), float(sigma[2])),
-        float(np.exp(p[3])), reason,
-    )  # fmt: skip
+        gain=(float(p[0]), float(np.hypot(sigma[0], BIAS / GRAVITY))),
+        lag=(constant, constant * float(sigma[1])),
+        delay=(float(p[2]), float(sigma[2])),
+        filter=float(np.exp(p[3])),
+        reason=reason,
+    )
 
 
 def _fit(
@@ -121,8 +127,6 @@ def _covariance(jacobian: np.ndarray, rest: np.ndarray, group: np.ndarray) -> np
     return sandwich * np.outer(wider, wider)
 
 
-
-
 def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
     """The samples that the commands drive: times, s, and specific force along body z, m/s^2."""
     inside = force.during(command.time[0] + LATEST, command.time[-1])
@@ -136,9 +140,10 @@ def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
     until = np.interp(grid - late, command.time, area)
     until += np.maximum(grid - late - command.time[-1], 0) * command.values[-1, 0]
     until += np.minimum(grid - late - command.time[0], 0) * command.values[0, 0]
-    force = np.diff(until, prepend=until[0] - GRID * command.values[0, 0]) / GRID
-    for constant in (lag, stage, stage):
-        force = lagged(force, constant, GRID)
+    asked = np.maximum(np.diff(until, prepend=until[0] - GRID * command.values[0, 0]) / GRID, 0.0)
+    force = lagged(np.sqrt(asked), lag, GRID) ** 2
+    for _ in range(2):
+        force = lagged(force, stage, GRID)
     return gain * np.interp(time, grid, force)
 
 

@@ -17,8 +17,8 @@ from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from e2efly.alignment.alignment import Alignment
-    from e2efly.validation.closed_loop import ClosedLoop
     from e2efly.logs.recording import Record
+    from e2efly.validation.closed_loop import ClosedLoop
 
 THRUST = 0.03
 """Relative difference of the thrust above which it is reported."""
@@ -209,14 +209,22 @@ def _report(
         "parameters": _rows(vehicle, found),
         "thrust_over_simulated": found.thrust if np.isfinite(found.thrust) else None,
         "delay_from": "setpoints" if found.measured else "response",
-        "thrust_response": None if told is None else {
+        "thrust_response": None
+        if told is None
+        else {
             name: {"value": value, "sigma": sigma, "unit": unit}
             for name, (value, sigma), unit in (
-                ("gain", told.gain, "1"), ("time_constant", told.lag, "s"), ("delay", told.delay, "s")
+                ("gain", told.gain, "1"),
+                ("time_constant", told.lag, "s"),
+                ("delay", told.delay, "s"),
             )
         },
-        "policy": None if loop is None else {
-            "file": str(loop.policy), "task": loop.task, "compared_s": loop.compared,
+        "policy": None
+        if loop is None
+        else {
+            "file": str(loop.policy),
+            "task": loop.task,
+            "compared_s": loop.compared,
             "rms_difference": {
                 stream: {"unit": unit, **{name: loop.difference(name, stream) for name in loop.simulated}}
                 for stream, unit in SIGNALS_OF_LOOP.items()

@@ -1,8 +1,6 @@
 """`e2efly fly`: no JAX, so that it starts at once on a companion computer."""
 
 import dataclasses
-import json
-import platform
 import sys
 import time
 from contextlib import ExitStack, suppress
@@ -12,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from e2efly import __version__
 from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
+from e2efly.commands.fly_meta import record_meta
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.terminal import Terminal
 from e2efly.flight.betaflight.client import SCHEDULE, Client
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.link import Link, open_link
-from e2efly.flight.betaflight.row import Row, problems
+from e2efly.flight.betaflight.row import problems
 from e2efly.flight.betaflight.settings_check import check_hover, examine, hover_schedule
 from e2efly.flight.betaflight.watchdog import WatchedLink
 from e2efly.flight.bridge import Bridge
@@ -28,7 +26,7 @@ from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.excitation import EXCITATION_SCHEDULE, NAMES, ExcitationOptions, StepsOptions, excitation
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
-from e2efly.flight.log_record import Log, Logs
+from e2efly.flight.log_record import Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
 from e2efly.flight.pilot.fence import check_course
@@ -65,8 +63,9 @@ class Fly:
     """Fly a Betaflight quadrotor. The pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
-    """A policy.onnx, a run directory, or a task (the zoo's policy). `excitation` flies the manoeuvres that
-    identification needs, in place of a policy, and `steps` those that alignment needs. If omitted: take-off, hover and landing only.
+    """A policy.onnx, a run directory, or a task (the zoo's policy). In place of a policy, `excitation` flies the
+    manoeuvres that identification needs, and `steps` those that alignment needs. If omitted: take-off, hover and
+    landing only.
     `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
@@ -294,7 +293,7 @@ def run(options: Fly) -> int:
             stack.callback(shown.close)
         log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
         bridge.log = log
-        _record_meta(log, bridge, body, contract.to_json() if contract else "", rows, _flies(options, plan))
+        record_meta(log, bridge, body, contract.to_json() if contract else "", rows, _flies(options, plan))
         rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
         say = Speaker(sys.stdout)
         stack.callback(say.close)
@@ -402,22 +401,3 @@ def _flies(options: Fly, plan: _Prepared) -> dict[str, Any]:
     """What flies, for the log: controller of the hover, file of the policy, and where it flies to."""
     policy = None if plan.policy is None else str(plan.policy.resolve())
     return {"hover": options.hover, "policy": policy, "goal": None if plan.goal is None else vars(plan.goal)}
-
-
-def _record_meta(
-    log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...], flies: dict[str, Any]
-) -> None:
-    settings = {
-        **flies,
-        "flight": dataclasses.asdict(bridge.settings),
-        "controller": {row.setting: row.value for row in rows},
-        "throttle_map": json.loads(throttle_map.as_json(bridge.map)),
-    }
-    versions = {
-        "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),
-        "firmware": bridge.info.firmware, "msp": ".".join(map(str, bridge.info.api)),
-    }  # fmt: skip
-    log.record("meta", time.monotonic(), {
-        "contract": contract, "vehicle": f"{body.name} {body.hash}", "settings": json.dumps(settings, default=str),
-        "versions": json.dumps(versions),
-    })  # fmt: skip

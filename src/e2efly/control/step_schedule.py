@@ -12,7 +12,7 @@ from e2efly.vehicles.vehicle import Vehicle
 
 FIRST = 3.0
 """Time to fly to the place and hover there before the first step, s."""
-HOVER = 1.5
+HOVER = 2.2
 """Time to return and hover between two pairs of steps, s."""
 REST = 0.2
 """Time with zero rates and the thrust of hover before and after each pair of steps, s."""

@@ -53,8 +53,8 @@ PULSED = 0.45
 """The tilt that doublets and chirps may add to the tilt for steering, rad."""
 LEAST_TILT = 0.3
 """The smallest tilt that must remain for steering below the fence's tilt, rad."""
-ASTRAY = 0.3
-"""How far from its place and how much more tilted a vehicle may be when a step begins, m and rad."""
+ASTRAY = 0.5
+"""How far from its place a step may begin or, by the speed that is left, end, m."""
 QUICK = 0.8
 """The share of the fence's speed that is flown."""
 _ELAPSED = Field("elapsed", 1, "none", "s", 1.0, "time since the beginning")
@@ -239,10 +239,14 @@ def room_of(settings: FlightSettings, name: str, need: Need) -> ManoeuvreRoom:
             )
     if fence.speed * QUICK < need.speed:
         least = need.speed / QUICK
-        raise ValueError(f"flight.fence.speed is {fence.speed:g}; accepted for {name}: {least:.3g} m/s or more{need.less}")
+        raise ValueError(
+            f"flight.fence.speed is {fence.speed:g}; accepted for {name}: {least:.3g} m/s or more{need.less}"
+        )
     if fence.tilt < LEAST_TILT + need.tilt:
         least = LEAST_TILT + need.tilt
-        raise ValueError(f"flight.fence.tilt is {fence.tilt:g}; accepted for {name}: {least:.3g} rad or more{need.less}")
+        raise ValueError(
+            f"flight.fence.tilt is {fence.tilt:g}; accepted for {name}: {least:.3g} rad or more{need.less}"
+        )
     return ManoeuvreRoom(low, high, *_stopping(settings))
 
 

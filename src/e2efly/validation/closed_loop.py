@@ -163,4 +163,3 @@ def _route(log: FlightLog, policy: Policy) -> Route | None:
         return Path(value) if isinstance(defaults[name], Path) else value
 
     return kind(**{name: typed(name, value) for name, value in told.items()})
-

@@ -12,8 +12,9 @@ import numpy as np
 from scipy.signal import spectrogram, welch
 
 from e2efly.logs.blackbox import Blackbox
-from e2efly.viewing.flight_data import AXES
-from e2efly.viewing.rate_response import StepResponse, step_response
+from e2efly.logs.flight_log import FlightLog
+from e2efly.viewing.flight_data import AXES, blackbox_responses, gyro, response_numbers
+from e2efly.viewing.rate_response import StepResponse
 
 LEAST_S, LEAST_HZ = 4.0, 200.0
 """Shortest log, s, and lowest sampling rate, Hz, of which spectra are made. Motors and frames vibrate above 100 Hz."""
@@ -91,8 +92,8 @@ def pid_analysis(box: Blackbox, of: str) -> PidAnalysis:
     lost = float(pauses[pauses > 1.5 / rate].sum() - (pauses > 1.5 / rate).sum() / rate) / float(np.ptp(time))
     if lost > LOST:
         raise ValueError(
-            f"{of}: {100 * lost:.1f} % of the time is in gaps, the longest of {1e3 * pauses.max():.0f} ms; accepted for "
-            f"a PID analysis: up to {100 * LOST:g} %, as on a faster card, or with a lower blackbox_sample_rate"
+            f"{of}: {100 * lost:.1f} % of the time is in gaps, the longest of {1e3 * pauses.max():.0f} ms; accepted "
+            f"for a PID analysis: up to {100 * LOST:g} %, as on a faster card, or with a lower blackbox_sample_rate"
         )
     even = np.arange(time[0], time[-1], 1 / rate)  # a lost frame must not move what comes after it
 
@@ -107,8 +108,20 @@ def pid_analysis(box: Blackbox, of: str) -> PidAnalysis:
     spectra = GyroSpectra(
         frequency, np.sqrt(filtered), unfiltered, _by_throttle(gyro if raw is None else raw, throttle, rate, size)
     )
-    found = {axis: step_response(time, box.setpoint[:, i], time, box.gyro[:, i]) for i, axis in enumerate(AXES)}
+    found = blackbox_responses(box)
     return PidAnalysis(time, rate, box.setpoint, box.gyro, found, spectra, box.terms, box.firmware)
+
+
+def analysis_of(log: FlightLog, box: Blackbox | None) -> PidAnalysis | str:
+    """The analysis of a flight, from its blackbox, or the reason why there is none."""
+    if box is None:
+        time, _, _ = gyro(log)
+        rate = 1 / float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        return f"{log.path}: has {rate:.0f} samples of the gyro a second; accepted for a PID analysis: --blackbox FILE"
+    try:
+        return pid_analysis(box, f"blackbox of {log.path}")
+    except ValueError as error:
+        return str(error)
 
 
 def _by_throttle(gyro: np.ndarray, throttle: np.ndarray, rate: float, size: int) -> np.ndarray:
@@ -128,6 +141,7 @@ def pid_numbers(found: PidAnalysis) -> dict[str, object]:
     spectra, rows = found.spectra, {}
     for i, axis in enumerate(AXES):
         row: dict[str, object] = {
+            "step_response": response_numbers(found.responses[axis]),
             "noise_rad_s": float(spectra.noise(spectra.filtered)[i]),
             "unfiltered_noise_rad_s": None,
             "noise_peak_hz": float(spectra.peak(spectra.filtered)[i]),
