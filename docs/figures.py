@@ -171,8 +171,8 @@ the overshoot. No overshoot is given for thrust, because an accelerometer shakes
     "step_alignment": """
 Vehicles as in the tables of the identification, flown for 38 s by `e2efly fly steps`, on seeds that were not
 used for tuning. In MuJoCo, truth is exact. Behind the firmware, it is the rig's own clock for the delay (poses'
-age and time from a command to the setpoint) and the body's motor lag; only the bridge's own log is used. The
-sigma of the thrust is 1 %, the accelerometer's bias. [How it is done](identification.md#steps).""",
+age and time from a command to the setpoint) and the body's motor lag; only the bridge's own log is used.
+[How it is done](identification.md#steps).""",
     "tune": """
 Race with VIS-R's file. The body has up to 25 % more mass, up to 20 % less thrust, inertia up to x1.5,
 motor lag up to x1.6, up to 30 ms more delay and drag up to x2, and at least half of each of these changes.

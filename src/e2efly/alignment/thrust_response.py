@@ -1,7 +1,8 @@
 """The response of the thrust to its command: gain, delay and a first-order lag, fitted to the accelerometer.
 
 The rotors' speed, whose square the thrust is, follows its command after a delay and with a first-order lag, as in the
-physics. The flight controller filters its accelerometer by two equal first-order stages; other logs are unfiltered.
+physics. The flight controller filters its accelerometer by two equal first-order stages; other logs are unfiltered. The
+accelerometer has a bias.
 Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964).
 """
 
@@ -17,7 +18,6 @@ from e2efly.alignment.shooting import FLOOR, HUBER
 from e2efly.alignment.windows import LENGTH
 from e2efly.logs.blackbox_merge import DELAY_SIGMA
 from e2efly.logs.recording import Record, Stream
-from e2efly.vehicles.gravity import GRAVITY
 
 GRID = 0.001
 """Step in time of the simulated response, s."""
@@ -29,8 +29,8 @@ FLY = "steps of thrust of 3 m/s^2 and more, 0.2 s and longer each, three of them
 FILTER_SPREAD, UNFILTERED = 0.7, 1e-4
 """Standard deviation of the logarithm of the filter's time constant before the fit; and the time constant that stands
 for no filter, s."""
-BIAS = 0.1
-"""Standard deviation of the accelerometer's bias, m/s^2. A fit cannot tell it from the gain."""
+BIAS = 0.3
+"""Standard deviation of the accelerometer's bias before the fit, m/s^2."""
 LATEST = 0.25
 """Longest delay and lag that are tried, s."""
 
@@ -71,11 +71,11 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
         return np.concatenate([_foretold(p, command, _inside(command, force)[0]) for command, force in pairs])
 
     late = 0.02 if delay is None else delay
-    free = np.array([1.0, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD])
+    free = np.array([1.0, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD, BIAS])
     fits = []
     for stage in (FORCE_FILTER, UNFILTERED):  # a log has the filter, or has none
-        p0 = np.array([1.0, np.log(lag), late, np.log(stage)])
-        kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3]
+        p0 = np.array([1.0, np.log(lag), late, np.log(stage), 0.0])
+        kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3, 1.0]
         fits.append(_fit(foretold, seen, p0, kept))
     (p, jacobian, rest), _ = min(fits, key=lambda fit: fit[1])
     group = np.floor(np.concatenate([_inside(*pair)[0] for pair in pairs]) / LENGTH).astype(int)
@@ -88,7 +88,7 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
         reason = f"+- {100 * sigma[1]:.0f} %"
     constant = float(np.exp(p[1]))
     return ThrustResponse(
-        gain=(float(p[0]), float(np.hypot(sigma[0], BIAS / GRAVITY))),
+        gain=(float(p[0]), float(sigma[0])),
         lag=(constant, constant * float(sigma[1])),
         delay=(float(p[2]), float(sigma[2])),
         filter=float(np.exp(p[3])),
@@ -107,7 +107,7 @@ def _fit(
         def left(p: np.ndarray, scale: float = scale) -> np.ndarray:
             return np.concatenate([(foretold(p) - seen) / scale, (p - p0) / free])
 
-        found = least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=[0.01, 0.1, 0.002, 0.1])
+        found = least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=[0.01, 0.1, 0.002, 0.1, 0.1])
         p = found.x
         noise = max(float(1.4826 * np.median(np.abs(foretold(p) - seen))), FLOOR["specific_force"])
         cost = float(found.cost + len(seen) * np.log(scale))
@@ -134,7 +134,7 @@ def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
-    gain, lag, late, stage = p[0], np.exp(p[1]), p[2], np.exp(p[3])
+    gain, lag, late, stage, bias = p[0], np.exp(p[1]), p[2], np.exp(p[3]), p[4]
     grid = np.arange(command.time[0], time[-1] + GRID, GRID)
     area = np.concatenate([[0.0], np.cumsum(command.values[:-1, 0] * np.diff(command.time))])
     until = np.interp(grid - late, command.time, area)
@@ -144,7 +144,7 @@ def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
     force = lagged(np.sqrt(asked), lag, GRID) ** 2
     for _ in range(2):
         force = lagged(force, stage, GRID)
-    return gain * np.interp(time, grid, force)
+    return gain * np.interp(time, grid, force) + bias
 
 
 def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
