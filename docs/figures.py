@@ -169,7 +169,7 @@ VIS-R; mean of four steps of each command. The table has the time until 10 % and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.
 [How it is done, and the picture](identification.md#align).""",
     "step_alignment": """
-Vehicles as in the tables of the identification, flown for 38 s by `e2efly fly steps`, on seeds that were not
+Vehicles as in the tables of the identification, flown for 39 s by `e2efly fly steps`, on seeds that were not
 used for tuning. In MuJoCo, truth is exact. Behind the firmware, it is the rig's own clock for the delay (poses'
 age and time from a command to the setpoint) and the body's motor lag; only the bridge's own log is used.
 [How it is done](identification.md#steps).""",

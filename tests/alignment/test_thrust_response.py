@@ -47,5 +47,5 @@ def test_of_an_accelerometer_that_is_filtered_and_seldom_reported_with_a_delay_t
 def test_a_hover_shows_the_gain_alone_and_a_log_without_thrust_nothing() -> None:
     found = thrust_response([stepped(0.2, 0.0, 250.0, 0.2)], 0.025)
     assert found is not None and "m/s^2 rms within a second, needed 0.5" in found.reason
-    assert found.gain[0] == pytest.approx(GAIN, rel=0.005)
+    assert found.gain[0] == pytest.approx(GAIN, rel=0.03)  # as well as the accelerometer's bias is known
     assert thrust_response([stepped(0.0, 0.0, 250.0, 0.2)], 0.025) is None

@@ -144,6 +144,7 @@ def test_a_fence_without_room_is_refused_by_name(fence: dict[str, object], said:
         ({"tilt": 0.6}, {}, "flight.fence.tilt is 0.6; accepted for steps: 0.7 rad or more, or smaller --steps.rate"),
         ({}, {"length": 0.5}, "accepted for steps"),
         ({}, {"rate": 7.0}, r"steps\.rate is 7"),
+        ({"tilt": 3.0}, {"rate": 4.0, "length": 0.5}, r"steps\.rate times steps\.length is 2; accepted: up to 1 rad"),
     ],
 )
 def test_steps_without_room_are_refused_by_name(fence: dict[str, object], options: dict[str, float], said: str) -> None:

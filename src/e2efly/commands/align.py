@@ -44,8 +44,9 @@ class Align:
     """Age of the poses when a command is made from them, s. Commands and body rates do not show this part of the
     vehicle's latency. If omitted, the value in the logs (our .mcap has it), otherwise 0."""
     policy: Path | None = None
-    """A policy.onnx that flew in one of the logs, our .mcap: the simulator flies it from the same start, and the plot
-    policy.png shows both. If omitted, the policy that the log names, if its file is still there."""
+    """The policy that flew in one of the logs, our .mcap: a policy.onnx, a run directory, or a task (the zoo's policy).
+    The simulator flies it from the same start, and policy.png shows both. If omitted, the policy that the log names, if
+    its file is still there."""
     read: tyro.conf.OmitArgPrefixes[LogOptions] = LogOptions()
 
 
@@ -133,10 +134,12 @@ def _closed_loop(
     """
     from e2efly.logs.flight_log import read_log
     from e2efly.logs.readers import OURS
+    from e2efly.policy.zoo import policy_file
     from e2efly.validation.closed_loop import closed_loop, policy_of
 
+    given = None if options.policy is None else policy_file(options.policy, options.vehicle)
     logs = [(read_log(record.path), record) for record in records if record.kind == OURS]
-    flew = [(log, record, policy) for log, record in logs if (policy := policy_of(log, options.policy)) is not None]
+    flew = [(log, record, policy) for log, record in logs if (policy := policy_of(log, given)) is not None]
     if not flew and options.policy is not None:
         raise ValueError(f"--policy is {str(options.policy)!r}; accepted: the policy that flew in one of the logs")
     if not flew:

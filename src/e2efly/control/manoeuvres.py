@@ -169,7 +169,9 @@ class Wish:
     yaw: float
     """Heading to hold, rad."""
     leg: int = 0
+    """Index of the line that is flown."""
     since: float = 0.0
+    """Start time of this line, s from the beginning."""
     bare: bool = False
     """Whether nothing steers: the body rates are `rates` alone, and the thrust is that of hover and `push`."""
 

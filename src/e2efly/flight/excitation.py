@@ -55,6 +55,8 @@ LEAST_TILT = 0.3
 """The smallest tilt that must remain for steering below the fence's tilt, rad."""
 ASTRAY = 0.5
 """How far from its place a step may begin or, by the speed that is left, end, m."""
+STEEPEST = 1.0
+"""The largest tilt of a step, rad. Further, the thrust of hover no longer carries half of the weight."""
 QUICK = 0.8
 """The share of the fence's speed that is flown."""
 _ELAPSED = Field("elapsed", 1, "none", "s", 1.0, "time since the beginning")
@@ -164,11 +166,12 @@ def excitation(
     name = next(name for name, kind in NAMES.items() if isinstance(options, kind))
     check_fields(name, options)
     late: float = vehicle.latency if latency is None else latency
+    if isinstance(options, StepsOptions):
+        _check_steps(vehicle, options)
     need = _need(settings, options)
     room = room_of(settings, name, need)
     if isinstance(options, StepsOptions):
         schedule: Schedule = _steps(options)
-        _check_vehicle(vehicle, options)
     else:
         schedule = Manoeuvres(options.seconds, min(options.speed, QUICK * settings.fence.speed))
     steer = softened(flight_gains(vehicle, late), min(TILT, settings.fence.tilt - need.tilt))
@@ -211,8 +214,11 @@ def _stopping(settings: FlightSettings) -> tuple[float, float]:
     return min(BRAKING, settings.fence.braking), max(REACTION, settings.fence.reaction)
 
 
-def _check_vehicle(vehicle: Vehicle, options: StepsOptions) -> None:
-    """Refuse steps that the vehicle cannot follow."""
+def _check_steps(vehicle: Vehicle, options: StepsOptions) -> None:
+    """Refuse steps that tilt too far, or that the vehicle cannot follow."""
+    tilt = _steps(options).tilt
+    if tilt > STEEPEST:
+        raise ValueError(f"steps.rate times steps.length is {tilt:.3g}; accepted: up to {STEEPEST:g} rad")
     fastest = float(np.min(vehicle.body_rate_max))
     if options.rate > fastest:
         raise ValueError(f"steps.rate is {options.rate:g}; accepted for {vehicle.name}: up to {fastest:.2g} rad/s")
