@@ -331,5 +331,5 @@ def test_steps_need_a_vehicle_and_room() -> None:
     with pytest.raises(ValueError, match="--vehicle is left out"):
         fly_command(Fly(policy=Path("steps")))
     small = FlightSettings(fence=Fence(low=(-1.0, -1.0, 0.2), high=(1.0, 1.0, 4.5)))
-    with pytest.raises(ValueError, match=r"in x, which leaves 1\.4 m .*; accepted for steps: .* or smaller --steps.rate"):
+    with pytest.raises(ValueError, match=r"in x, which leaves 1\.4 m .* for steps: .* or smaller --steps.rate"):
         fly_command(Fly(policy=Path("steps"), vehicle="vis_r", flight=small))

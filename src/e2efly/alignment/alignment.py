@@ -99,9 +99,8 @@ def align(
     link = float(np.mean(links)) if links else None
     response = thrust_response(records, float(vehicle.motor_time_constant), link)
     base = dataclasses.replace(vehicle, latency=own)
-    tuned = base
-    if response is not None and not response.reason:
-        tuned = dataclasses.replace(base, motor_time_constant=response.lag[0])
+    lag = None if response is None or response.reason else response.lag
+    tuned = base if lag is None else dataclasses.replace(base, motor_time_constant=lag[0])
     if link is not None:
         tuned = dataclasses.replace(tuned, latency=max(link, 0.0))
     found = identify(tuned, records, believed=base, step=True, delay=link is None, told=told)
@@ -123,12 +122,13 @@ def align(
     estimates = [dataclasses.replace(e, source=source) for e in estimates]
     if late is not None or link is not None:
         value, sigma = (tuned.latency, DELAY_SIGMA) if late is None else (float(late.value), float(late.sigma))
+        if late is not None and lag is not None:  # what the lag takes too much, the delay has too little
+            sigma = float(np.hypot(sigma, lag[1]))
         value, sigma = max(value, 0.0), float(np.hypot(sigma, early))
         delay = own, value, sigma
         estimates.append(Estimate("latency", np.array(value + pose_delay), np.array(sigma), source))
-    if response is not None and not response.reason:
-        lag, sigma = response.lag
-        estimates.append(Estimate("motor_time_constant", np.array(lag), np.array(sigma), source))
+    if lag is not None:
+        estimates.append(Estimate("motor_time_constant", *map(np.array, lag), source))
     model = Model.of(base, found.model.driver, base, found.model.names)
     part = Alignment(
         found, model, delay, early, pose_delay, estimates, found.refusals, {}, {}, np.nan, response, link is not None

@@ -89,7 +89,7 @@ def run(options: Align) -> int:
             told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}"),
         )
     estimates = {e.name: e for e in found.estimates}
-    loop = _closed_loop(options, records, vehicle, merged(vehicle, estimates), found)
+    loop = _closed_loop(options, console, records, vehicle, merged(vehicle, estimates), found)
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "vehicle.toml"
     write_vehicle(file, options.vehicle, vehicle, estimates)
@@ -125,12 +125,17 @@ def run(options: Align) -> int:
 
 
 def _closed_loop(
-    options: Align, records: "list[Record]", vehicle: Vehicle, aligned: Vehicle, found: "Alignment"
+    options: Align,
+    console: Terminal,
+    records: "list[Record]",
+    vehicle: Vehicle,
+    aligned: Vehicle,
+    found: "Alignment",
 ) -> "ClosedLoop | None":
     """The simulator's flight by the policy of the first log in which one flew. None: none did, or its file is gone.
 
     Raises:
-        ValueError: naming --policy, if no log is of this policy's flight.
+        ValueError: naming --policy, if no log is of this policy's flight, or if the simulator cannot fly it.
     """
     from e2efly.logs.flight_log import read_log
     from e2efly.logs.readers import OURS
@@ -145,7 +150,13 @@ def _closed_loop(
     if not flew:
         return None
     log, record, policy = flew[0]
-    return closed_loop(log, record, *policy, {"before": vehicle, "aligned": aligned}, found.pose_delay)
+    try:
+        return closed_loop(log, record, *policy, {"before": vehicle, "aligned": aligned}, found.pose_delay)
+    except ValueError as error:
+        if options.policy is not None:
+            raise
+        console.print(f"The policy's closed loop is left out: {error}", style="bold", markup=False)
+        return None
 
 
 def pose_delay_of(given: float | None, records: "list[Record]") -> tuple[float, str, bool]:
