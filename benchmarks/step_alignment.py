@@ -45,10 +45,10 @@ DELAY_MS, GAIN_SHARE = 2.0, 0.05
 def in_mujoco(vehicle: Vehicle, seed: int) -> dict[str, Any]:
     """What was found, and the truth."""
     body = hidden(vehicle, np.random.default_rng(seed))
-    plant = find_plant("mujoco")(vehicle)
+    plant = find_plant("mujoco")(vehicle)  # type: ignore[call-arg]
     plant.meet(body)
     options = StepsOptions()
-    steps = Steps((options.rate,) * 3, options.thrust, options.length, options.count)
+    steps = Steps(options.rate, options.thrust, options.length, options.count)
     record = sensed(fly_excitation(plant, vehicle, body.latency, steps=steps), Sensors(pose_delay=0.0), seed)
     found = align(vehicle, [record])
     lift = float(body.thrust_map[0] / vehicle.thrust_map[0])

@@ -1,6 +1,7 @@
 """The excitation flight, which the bridge flies as a policy: inside the fence, whatever the vehicle, and so long."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,7 +148,7 @@ def test_a_fence_without_room_is_refused_by_name(fence: dict[str, object], said:
         ({"tilt": 3.0}, {"rate": 4.0, "length": 0.5}, r"steps\.rate times steps\.length is 2; accepted: up to 1 rad"),
     ],
 )
-def test_steps_without_room_are_refused_by_name(fence: dict[str, object], options: dict[str, float], said: str) -> None:
+def test_steps_without_room_are_refused_by_name(fence: dict[str, object], options: dict[str, Any], said: str) -> None:
     settings = dataclasses.replace(SETTINGS, fence=dataclasses.replace(Fence(), **fence))
     with pytest.raises(ValueError, match=said):
         excitation(FILE, settings, StepsOptions(**options))

@@ -25,7 +25,7 @@ def box(seconds: float = 12.0, motion: float = 2.0, rate: float = RATE) -> Black
     jumps = motion * rng.uniform(-1, 1, (int(seconds / 0.15) + 1, 3))
     setpoint = jumps[(time / 0.15).astype(int)]
     kept = np.exp(-1 / (rate * 0.04))
-    clean = lfilter([1 - kept], [1, -kept], setpoint, axis=0)
+    clean = np.asarray(lfilter([1 - kept], [1, -kept], setpoint, axis=0))
     motor = np.repeat(0.3 + 0.5 * (time > seconds / 2)[:, None], 4, axis=1)
     shaken = SIZE * motor[:, :1] * np.sin(2 * np.pi * PEAK * time)[:, None]
     raw = clean + shaken + 0.002 * rng.standard_normal(clean.shape)
@@ -55,7 +55,7 @@ def test_logs_that_are_not_to_be_believed_are_refused_by_name() -> None:
     whole = box()
     torn = np.ones(len(whole.time), bool)
     torn[3000:4000] = False
-    gappy = Blackbox(*(x[torn] for x in (whole.time, whole.gyro, whole.setpoint, whole.motor)), "test", 1)
+    gappy = Blackbox(whole.time[torn], whole.gyro[torn], whole.setpoint[torn], whole.motor[torn], "test", 1)
     for bad, said in (
         (box(2.0), r"a\.bbl: lasts 2\.0 s; accepted for a PID analysis: 4 s"),
         (box(12.0, rate=125.0), r"a\.bbl: has 125 samples a second; .* 200 or more, set blackbox_sample_rate"),

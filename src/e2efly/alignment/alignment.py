@@ -128,7 +128,7 @@ def align(
         delay = own, value, sigma
         estimates.append(Estimate("latency", np.array(value + pose_delay), np.array(sigma), source))
     if lag is not None:
-        estimates.append(Estimate("motor_time_constant", *map(np.array, lag), source))
+        estimates.append(Estimate("motor_time_constant", np.array(lag[0]), np.array(lag[1]), source))
     model = Model.of(base, found.model.driver, base, found.model.names)
     part = Alignment(
         found, model, delay, early, pose_delay, estimates, found.refusals, {}, {}, np.nan, response, link is not None

@@ -8,6 +8,7 @@ Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Locatio
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -29,6 +30,9 @@ FLY = "steps of thrust of 3 m/s^2 and more, 0.2 s and longer each, three of them
 FILTER_SPREAD, UNFILTERED = 0.7, 1e-4
 """Standard deviation of the logarithm of the filter's time constant before the fit; and the time constant that stands
 for no filter, s."""
+SCALE = (0.01, 0.1, 0.002, 0.1, 0.1)
+"""Sizes of steps of the fit: of the gain, the logarithm of the lag, the delay, the logarithm of the filter's time
+constant, and the bias."""
 BIAS = 0.3
 """Standard deviation of the accelerometer's bias before the fit, m/s^2."""
 LATEST = 0.25
@@ -100,18 +104,19 @@ def _fit(
     foretold: Callable[[np.ndarray], np.ndarray], seen: np.ndarray, p0: np.ndarray, free: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
     """Values, Jacobian and residuals over the spread, the last rows of both being the prior's; and the cost."""
-    p, noise, cost = p0, 1.0, np.inf
-    for _ in range(3):
-        scale = noise
 
-        def left(p: np.ndarray, scale: float = scale) -> np.ndarray:
-            return np.concatenate([(foretold(p) - seen) / scale, (p - p0) / free])
+    def left(p: np.ndarray, noise: float) -> np.ndarray:
+        return np.concatenate([(foretold(p) - seen) / noise, (p - p0) / free])
 
-        found = least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=[0.01, 0.1, 0.002, 0.1, 0.1])
-        p = found.x
+    def solved(p: np.ndarray, noise: float) -> Any:
+        return least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=SCALE, args=(noise,))
+
+    p, noise = p0, 1.0
+    for _ in range(2):
+        p = solved(p, noise).x
         noise = max(float(1.4826 * np.median(np.abs(foretold(p) - seen))), FLOOR["specific_force"])
-        cost = float(found.cost + len(seen) * np.log(scale))
-    return (p, found.jac, left(p)), cost
+    found = solved(p, noise)
+    return (found.x, found.jac, left(found.x, noise)), float(found.cost + len(seen) * np.log(noise))
 
 
 def _covariance(jacobian: np.ndarray, rest: np.ndarray, group: np.ndarray) -> np.ndarray:

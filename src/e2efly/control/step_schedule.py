@@ -26,8 +26,8 @@ ORDER = (1, 2, 3, 0)
 class Steps:
     """Pairs of steps: each command is stepped one way, and then as far and as long the other way."""
 
-    rates: tuple[float, float, float]
-    """Sizes of the steps of body rate, rad/s."""
+    rate: float
+    """Size of the steps of body rate, rad/s."""
     thrust: float
     """Size of the steps of thrust over mass, m/s^2."""
     length: float
@@ -63,13 +63,13 @@ class Steps:
         half = math.floor((phase - REST) / self.length)
         if half in (0, 1):
             channel = ORDER[number // self.count]
-            sizes[channel] = (self.thrust, *self.rates)[channel] * (-1) ** (half + number % self.count)
+            sizes[channel] = (self.rate if channel else self.thrust) * (-1) ** (half + number % self.count)
         return True, sizes
 
     @property
     def tilt(self) -> float:
         """The largest tilt of a pair, rad."""
-        return max(self.rates[:2]) * self.length
+        return self.rate * self.length
 
     def speed(self) -> np.ndarray:
         """The largest speed that a pair leads to, (3,) m/s."""

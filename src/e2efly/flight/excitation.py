@@ -181,7 +181,7 @@ def excitation(
 
 
 def _steps(options: StepsOptions) -> Steps:
-    return Steps((options.rate,) * 3, options.thrust, options.length, options.count)
+    return Steps(options.rate, options.thrust, options.length, options.count)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ SHOWN_S = 6.0
 """Longest time that is shown, s."""
 COMMANDS = ("thrust\n(m/s²)", "roll rate\n(rad/s)", "pitch rate\n(rad/s)", "yaw rate\n(rad/s)")
 FLIGHT: dict[str, Any] = MEASURED | {"label": "flight"}
+STEPPED: dict[str, Any] = {"drawstyle": "steps-post"}
 
 
 def plot_closed_loop(path: Path, loop: ClosedLoop) -> None:
@@ -58,10 +59,10 @@ def _draw_commands(ax: Axes, loop: ClosedLoop, channel: int) -> None:
         say(ax, f"the policy commands\n{loop.command_mode}")
         return
     time = loop.sent[:, 0]
-    ax.plot(time, loop.sent[:, 1 + channel], **(FLIGHT | {"drawstyle": "steps-post"}))
+    ax.plot(time, loop.sent[:, 1 + channel], **FLIGHT, **STEPPED)
     for (_, told), style in zip(loop.simulated.items(), (BEFORE, AFTER), strict=False):
         sent = told.time[:-1] + loop.shift
-        ax.plot(sent, told.command[:, channel], **(style | {"drawstyle": "steps-post"}))
+        ax.plot(sent, told.command[:, channel], **style, **STEPPED)
 
 
 def _draw(ax: Axes, loop: ClosedLoop, stream: str, axis: int | None) -> None:
