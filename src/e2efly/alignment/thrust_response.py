@@ -1,8 +1,9 @@
 """The response of the thrust to its command: gain, delay and a first-order lag, fitted to the accelerometer.
 
 The rotors' speed, whose square the thrust is, follows its command after a delay and with a first-order lag, as in the
-physics. The flight controller filters its accelerometer by two equal first-order stages; other logs are unfiltered. The
-accelerometer has a bias.
+physics. The flight controller filters its accelerometer by two equal first-order stages; other logs are unfiltered.
+What changes slowly (a bias, drag, a throttle map that is being learned) is not the response: every second of the log
+has an offset of its own.
 Least squares with Huber's weights (P. J. Huber, "Robust Estimation of a Location Parameter", 1964).
 """
 
@@ -16,7 +17,6 @@ from scipy.signal import lfilter
 
 from e2efly.alignment.model import FORCE_FILTER
 from e2efly.alignment.shooting import FLOOR, HUBER
-from e2efly.alignment.windows import LENGTH
 from e2efly.logs.blackbox_merge import DELAY_SIGMA
 from e2efly.logs.recording import Record, Stream
 
@@ -30,11 +30,13 @@ FLY = "steps of thrust of 3 m/s^2 and more, 0.2 s and longer each, three of them
 FILTER_SPREAD, UNFILTERED = 0.7, 1e-4
 """Standard deviation of the logarithm of the filter's time constant before the fit; and the time constant that stands
 for no filter, s."""
-SCALE = (0.01, 0.1, 0.002, 0.1, 0.1)
-"""Sizes of steps of the fit: of the gain, the logarithm of the lag, the delay, the logarithm of the filter's time
-constant, and the bias."""
-BIAS = 0.3
-"""Standard deviation of the accelerometer's bias before the fit, m/s^2."""
+SCALE = (0.01, 0.1, 0.002, 0.1)
+"""Sizes of steps of the fit: of the gain, the logarithm of the lag, the delay, and the logarithm of the filter's time
+constant."""
+STEADY = 0.02
+"""Standard deviation of the gain about that of the whole flight, which has the accelerometer's bias in it."""
+WINDOW = 1.0
+"""Length of the pieces of a log that have an offset of their own, s."""
 LATEST = 0.25
 """Longest delay and lag that are tried, s."""
 
@@ -71,18 +73,25 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
     pairs = [(r.streams["command"], r.streams["specific_force"]) for r in told]
     seen = np.concatenate([_inside(command, force)[1] for command, force in pairs])
 
+    seconds = [np.floor(_inside(*pair)[0] / WINDOW).astype(int) for pair in pairs]
+    first = np.cumsum([0, *(int(each.max()) + 1 for each in seconds)])
+    group = np.concatenate([each + begin for each, begin in zip(seconds, first[:-1], strict=True)])
+
     def foretold(p: np.ndarray) -> np.ndarray:
         return np.concatenate([_foretold(p, command, _inside(command, force)[0]) for command, force in pairs])
 
+    def missed(p: np.ndarray) -> np.ndarray:
+        return _without_means(foretold(p) - seen, group)
+
+    level = float(np.median(seen) / np.median(foretold(np.array([1.0, np.log(lag), 0.0, np.log(UNFILTERED)]))))
     late = 0.02 if delay is None else delay
-    free = np.array([1.0, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD, BIAS])
+    free = np.array([STEADY, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD])
     fits = []
     for stage in (FORCE_FILTER, UNFILTERED):  # a log has the filter, or has none
-        p0 = np.array([1.0, np.log(lag), late, np.log(stage), 0.0])
-        kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3, 1.0]
-        fits.append(_fit(foretold, seen, p0, kept))
+        p0 = np.array([level, np.log(lag), late, np.log(stage)])
+        kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3]
+        fits.append(_fit(missed, p0, kept))
     (p, jacobian, rest), _ = min(fits, key=lambda fit: fit[1])
-    group = np.floor(np.concatenate([_inside(*pair)[0] for pair in pairs]) / LENGTH).astype(int)
     sigma = np.sqrt(np.diag(_covariance(jacobian, rest, group)))
     changes = float(np.sqrt(np.mean([_changes(command) ** 2 for command, _ in pairs])))
     reason = ""
@@ -101,12 +110,12 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
 
 
 def _fit(
-    foretold: Callable[[np.ndarray], np.ndarray], seen: np.ndarray, p0: np.ndarray, free: np.ndarray
+    missed: Callable[[np.ndarray], np.ndarray], p0: np.ndarray, free: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
     """Values, Jacobian and residuals over the spread, the last rows of both being the prior's; and the cost."""
 
     def left(p: np.ndarray, noise: float) -> np.ndarray:
-        return np.concatenate([(foretold(p) - seen) / noise, (p - p0) / free])
+        return np.concatenate([missed(p) / noise, (p - p0) / free])
 
     def solved(p: np.ndarray, noise: float) -> Any:
         return least_squares(left, p, loss="huber", f_scale=HUBER, x_scale=SCALE, args=(noise,))
@@ -114,9 +123,9 @@ def _fit(
     p, noise = p0, 1.0
     for _ in range(2):
         p = solved(p, noise).x
-        noise = max(float(1.4826 * np.median(np.abs(foretold(p) - seen))), FLOOR["specific_force"])
+        noise = max(float(1.4826 * np.median(np.abs(missed(p)))), FLOOR["specific_force"])
     found = solved(p, noise)
-    return (found.x, found.jac, left(found.x, noise)), float(found.cost + len(seen) * np.log(noise))
+    return (found.x, found.jac, left(found.x, noise)), float(found.cost + (len(found.fun) - len(p)) * np.log(noise))
 
 
 def _covariance(jacobian: np.ndarray, rest: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -132,6 +141,12 @@ def _covariance(jacobian: np.ndarray, rest: np.ndarray, group: np.ndarray) -> np
     return sandwich * np.outer(wider, wider)
 
 
+def _without_means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Values without the mean of their group."""
+    count = np.maximum(np.bincount(group), 1)
+    return values - (np.bincount(group, values) / count)[group]
+
+
 def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
     """The samples that the commands drive: times, s, and specific force along body z, m/s^2."""
     inside = force.during(command.time[0] + LATEST, command.time[-1])
@@ -139,7 +154,7 @@ def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
-    gain, lag, late, stage, bias = p[0], np.exp(p[1]), p[2], np.exp(p[3]), p[4]
+    gain, lag, late, stage = p[0], np.exp(p[1]), p[2], np.exp(p[3])
     grid = np.arange(command.time[0], time[-1] + GRID, GRID)
     area = np.concatenate([[0.0], np.cumsum(command.values[:-1, 0] * np.diff(command.time))])
     until = np.interp(grid - late, command.time, area)
@@ -149,7 +164,7 @@ def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
     force = lagged(np.sqrt(asked), lag, GRID) ** 2
     for _ in range(2):
         force = lagged(force, stage, GRID)
-    return gain * np.interp(time, grid, force) + bias
+    return gain * np.interp(time, grid, force)
 
 
 def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
