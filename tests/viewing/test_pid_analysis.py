@@ -26,7 +26,7 @@ def box(seconds: float = 12.0, motion: float = 2.0, rate: float = RATE) -> Black
     setpoint = jumps[(time / 0.15).astype(int)]
     kept = np.exp(-1 / (rate * 0.04))
     clean = np.asarray(lfilter([1 - kept], [1, -kept], setpoint, axis=0))
-    motor = np.repeat(0.3 + 0.5 * (time > seconds / 2)[:, None], 4, axis=1)
+    motor = np.repeat(0.33 + 0.5 * (time > seconds / 2)[:, None], 4, axis=1)
     shaken = SIZE * motor[:, :1] * np.sin(2 * np.pi * PEAK * time)[:, None]
     raw = clean + shaken + 0.002 * rng.standard_normal(clean.shape)
     terms = {"P": 0.05 * (setpoint - clean), "I": np.full_like(clean, 0.01)}
@@ -38,12 +38,12 @@ def test_a_vibration_shows_in_the_unfiltered_gyro_and_at_the_throttle_where_it_i
     spectra = found.spectra
     assert spectra.unfiltered is not None
     assert spectra.peak(spectra.unfiltered) == pytest.approx(PEAK, abs=2.0)
-    level = np.sqrt(0.5 * (0.3**2 + 0.8**2)) * SIZE / np.sqrt(2)
+    level = np.sqrt(0.5 * (0.33**2 + 0.83**2)) * SIZE / np.sqrt(2)
     assert spectra.noise(spectra.unfiltered) == pytest.approx(level, rel=0.15)
     assert spectra.noise(spectra.filtered) == pytest.approx(0.1 * level, rel=0.3)
     at = int(np.argmin(np.abs(spectra.frequency - PEAK)))
-    low, high = (int(np.searchsorted(THROTTLES, t, side="right")) - 1 for t in (0.3001, 0.8001))
-    assert spectra.by_throttle[0, high, at] == pytest.approx(8 / 3 * spectra.by_throttle[0, low, at], rel=0.2)
+    low, high = (int(np.searchsorted(THROTTLES, t, side="right")) - 1 for t in (0.33, 0.83))
+    assert spectra.by_throttle[0, high, at] == pytest.approx(0.83 / 0.33 * spectra.by_throttle[0, low, at], rel=0.2)
     assert found.responses["roll"].reason == "" and found.responses["roll"].rise == pytest.approx(0.04, abs=0.004)
     row = pid_numbers(found)["axes"]["roll"]  # type: ignore[index]
     assert row["terms_rms"]["I"] == pytest.approx(0.01) and set(row["terms_rms"]) == {"P", "I"}

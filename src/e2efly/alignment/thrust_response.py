@@ -18,6 +18,7 @@ from scipy.signal import lfilter
 from e2efly.alignment.model import FORCE_FILTER
 from e2efly.alignment.shooting import FLOOR, HUBER
 from e2efly.logs.blackbox_merge import DELAY_SIGMA
+from e2efly.logs.readers import BLACKBOX, OURS
 from e2efly.logs.recording import Record, Stream
 
 GRID = 0.001
@@ -35,6 +36,14 @@ SCALE = (0.01, 0.1, 0.002, 0.1)
 constant."""
 STEADY = 0.02
 """Standard deviation of the gain about that of the whole flight, which has the accelerometer's bias in it."""
+STEP, FEW = 1.0, 6
+"""A change of the commanded thrust between two commands that counts as a step, m/s^2, and the number of steps from
+which on they alone are used."""
+SHORT, STRUCTURE = 1e-3, 0.1
+"""Time constant up to which the accelerometer counts as unfiltered, s; and the relative standard deviation of the lag
+that a filter of another form adds."""
+CALM, SETTLED = 0.1, 0.35
+"""The time before and after a step that is used, s."""
 WINDOW = 1.0
 """Length of the pieces of a log that have an offset of their own, s."""
 LATEST = 0.25
@@ -87,24 +96,26 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
     late = 0.02 if delay is None else delay
     free = np.array([STEADY, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD])
     fits = []
-    for stage in (FORCE_FILTER, UNFILTERED):  # a log has the filter, or has none
+    controller = all(record.kind in (OURS, BLACKBOX) for record in told)  # Betaflight filters its accelerometer
+    for stage in (FORCE_FILTER,) if controller else (FORCE_FILTER, UNFILTERED):
         p0 = np.array([level, np.log(lag), late, np.log(stage)])
         kept = free if stage == FORCE_FILTER else free * [1.0, 1.0, 1.0, 1e-3]
         fits.append(_fit(missed, p0, kept))
     (p, jacobian, rest), _ = min(fits, key=lambda fit: fit[1])
     sigma = np.sqrt(np.diag(_covariance(jacobian, rest, group)))
+    constant, stage = (float(np.exp(x)) for x in (p[1], p[3]))
+    sigma[1] = np.hypot(sigma[1], 0.0 if stage < SHORT else STRUCTURE)
     changes = float(np.sqrt(np.mean([_changes(command) ** 2 for command, _ in pairs])))
     reason = ""
     if changes < CHANGES:
         reason = f"the commanded thrust changes by {changes:.2g} m/s^2 rms within a second, needed {CHANGES:g}"
     elif sigma[1] > EXACT:
         reason = f"+- {100 * sigma[1]:.0f} %"
-    constant = float(np.exp(p[1]))
     return ThrustResponse(
         gain=(float(p[0]), float(sigma[0])),
         lag=(constant, constant * float(sigma[1])),
         delay=(float(p[2]), float(sigma[2])),
-        filter=float(np.exp(p[3])),
+        filter=stage,
         reason=reason,
     )
 
@@ -148,8 +159,16 @@ def _without_means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def _inside(command: Stream, force: Stream) -> tuple[np.ndarray, np.ndarray]:
-    """The samples that the commands drive: times, s, and specific force along body z, m/s^2."""
+    """The samples that the commands drive: times, s, and specific force along body z, m/s^2. If the thrust was stepped,
+    they are those about its steps: between them, disturbances and a throttle map that learns move the thrust, too.
+    """
     inside = force.during(command.time[0] + LATEST, command.time[-1])
+    steps = command.time[1:][np.abs(np.diff(command.values[:, 0])) >= STEP]
+    if len(steps) >= FEW:
+        after = inside.time - steps[np.maximum(np.searchsorted(steps, inside.time, side="right") - 1, 0)]
+        until = steps[np.minimum(np.searchsorted(steps, inside.time), len(steps) - 1)] - inside.time
+        near = ((after >= 0) & (after <= SETTLED)) | ((until >= 0) & (until <= CALM))
+        return inside.time[near], inside.values[near, 2]
     return inside.time, inside.values[:, 2]
 
 
