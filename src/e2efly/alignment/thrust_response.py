@@ -87,7 +87,7 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
     group = np.concatenate([each + begin for each, begin in zip(seconds, first[:-1], strict=True)])
 
     def foretold(p: np.ndarray) -> np.ndarray:
-        return np.concatenate([_foretold(p, command, _inside(command, force)[0]) for command, force in pairs])
+        return np.concatenate([_foretold(p, *each) for each in zip(commands, times, strict=True)])
 
     def missed(p: np.ndarray) -> np.ndarray:
         return _without_means(foretold(p) - seen, group)
@@ -105,7 +105,7 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
     sigma = np.sqrt(np.diag(_covariance(jacobian, rest, group)))
     constant, stage = (float(np.exp(x)) for x in (p[1], p[3]))
     sigma[1] = np.hypot(sigma[1], 0.0 if stage < SHORT else STRUCTURE)
-    changes = float(np.sqrt(np.mean([_changes(command) ** 2 for command, _ in pairs])))
+    changes = float(np.sqrt(np.mean([_changes(command) ** 2 for command in commands])))
     reason = ""
     if changes < CHANGES:
         reason = f"the commanded thrust changes by {changes:.2g} m/s^2 rms within a second, needed {CHANGES:g}"
