@@ -79,10 +79,10 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
     told = [r for r in told if np.ptp(r.streams["command"].values[:, 0]) > 0]
     if not told:
         return None
-    pairs = [(r.streams["command"], r.streams["specific_force"]) for r in told]
-    seen = np.concatenate([_inside(command, force)[1] for command, force in pairs])
-
-    seconds = [np.floor(_inside(*pair)[0] / WINDOW).astype(int) for pair in pairs]
+    commands = [r.streams["command"] for r in told]
+    felt = [_inside(command, r.streams["specific_force"]) for command, r in zip(commands, told, strict=True)]
+    times, seen = [time for time, _ in felt], np.concatenate([force for _, force in felt])
+    seconds = [np.floor(time / WINDOW).astype(int) for time in times]
     first = np.cumsum([0, *(int(each.max()) + 1 for each in seconds)])
     group = np.concatenate([each + begin for each, begin in zip(seconds, first[:-1], strict=True)])
 
