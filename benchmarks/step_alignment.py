@@ -5,8 +5,9 @@
 The vehicles are drawn as in benchmarks/identify.py. `e2efly fly steps` flies each, and `e2efly align` aligns the file
 with the log. In MuJoCo, the flight controller is a rate loop of first order that believes in the file, and the log has
 the noise of `e2efly.validation.plant_excitation`; the delay, the gain of each axis and the motor lag are known exactly.
-Behind the real firmware (in virtual time; the bridge's own log alone), the delay is known by the rig's clock: the age
-of the poses, and the time from a command to the setpoint of the blackbox. The firmware has P, I and D, and no gain.
+Behind the real firmware (in virtual time; by the bridge's own log, and with the blackbox laid over it), the delay is
+known by the rig's clock: the age of the poses, and the time from a command to the setpoint of the blackbox. The
+firmware has P, I and D, and no gain.
 
 Seeds from 900 on were for tuning; the published figures are of seeds from 0 on. A script that was stopped goes on where
 it was.
@@ -59,7 +60,7 @@ def in_mujoco(vehicle: Vehicle, seed: int) -> dict[str, Any]:
 
 
 def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Any]:
-    """What was found from the bridge's log alone, and the truth by the rig's clock."""
+    """What was found from the bridge's log alone and with the blackbox, and the truth by the rig's clock."""
     body = hidden(vehicle, np.random.default_rng(seed))
     settings = dataclasses.replace(rehearsal_settings(1.5), fence=ROOM)
     with tempfile.TemporaryDirectory() as folder:
@@ -75,9 +76,13 @@ def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Any]:
         link, age = setpoint_delay(exact), flight.truth.pose_age
         assert link is not None
         assert age is not None
-        records = checked(read_flights(path), vehicle)
-        found = align(vehicle, records, pose_delay_of(None, records)[0])
-    return told(found, body, {"delay_s": link + age, "thrust": 1.0}, found.delay[1] + found.pose_delay)
+        out = {}
+        for label, logs in (("alone", [path]), ("with_blackbox", [path, flight.blackbox])):
+            records = checked(with_blackboxes([r for each in logs for r in read_flights(each)]), vehicle)
+            found = align(vehicle, records, pose_delay_of(None, records)[0])
+            delay = found.delay[1] + found.pose_delay
+            out[label] = told(found, body, {"delay_s": link + age, "thrust": 1.0}, delay)
+    return out
 
 
 def told(found: Alignment, body: Vehicle, truth: dict[str, Any], delay: float) -> dict[str, Any]:
@@ -101,9 +106,12 @@ def told(found: Alignment, body: Vehicle, truth: dict[str, Any], delay: float) -
 
 def rows_of(runs: list[dict[str, Any]]) -> list[dict[str, str]]:
     """A row for each plant and quantity."""
-    rows = []
-    for plant in dict.fromkeys(run["plant"] for run in runs):
-        own = [run for run in runs if run["plant"] == plant and "found" in run]
+    rows, each = [], list[dict[str, Any]]()
+    for run in runs:
+        parts = {name: run[key] for key, name in LOGS.items() if key in run} or {run["plant"]: run}
+        each += [{**part, "plant": name} for name, part in parts.items() if "found" in part]
+    for plant in dict.fromkeys(run["plant"] for run in each):
+        own = [run for run in each if run["plant"] == plant]
         for name, label, unit, scale in (
             ("delay_s", "delay", "ms", 1e3), ("rate_gain", "rate gain", "%", 100.0),
             ("motor_lag_s", "motor lag", "ms", 1e3), ("thrust", "thrust over commanded", "%", 100.0),
@@ -133,6 +141,7 @@ def rows_of(runs: list[dict[str, Any]]) -> list[dict[str, str]]:
     return rows
 
 
+LOGS = {"alone": "firmware, bridge's log", "with_blackbox": "firmware, with blackbox"}
 HELD_OUT = ("before", "aligned")
 
 

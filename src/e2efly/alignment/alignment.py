@@ -96,8 +96,9 @@ def align(
     """
     own = max(float(vehicle.latency) - pose_delay, 0.0)
     links = [late for late in map(_link, records) if late is not None]
-    link = float(np.mean(links)) if links else None
-    response = thrust_response(records, float(vehicle.motor_time_constant), link)
+    link = float(np.mean([late for late, _ in links])) if links else None
+    spread = float(np.max([off for _, off in links])) if links else np.inf
+    response = thrust_response(records, float(vehicle.motor_time_constant), link, spread)
     base = dataclasses.replace(vehicle, latency=own)
     lag = None if response is None or response.reason else response.lag
     tuned = base if lag is None else dataclasses.replace(base, motor_time_constant=lag[0])
@@ -121,7 +122,7 @@ def align(
     delay, estimates = (own, np.nan, np.nan), [e for e in found.estimates if e.name != "latency"]
     estimates = [dataclasses.replace(e, source=source) for e in estimates]
     if late is not None or link is not None:
-        value, sigma = (tuned.latency, DELAY_SIGMA) if late is None else (float(late.value), float(late.sigma))
+        value, sigma = (tuned.latency, spread) if late is None else (float(late.value), float(late.sigma))
         if late is not None and lag is not None:  # what the lag takes too much, the delay has too little
             sigma = float(np.hypot(sigma, lag[1]))
         value, sigma = max(value, 0.0), float(np.hypot(sigma, early))
@@ -138,13 +139,15 @@ def align(
     return dataclasses.replace(part, before=before, after=after, thrust=thrust)
 
 
-def _link(record: Record) -> float | None:
-    """The time from a command to the setpoint, s. None: the log does not show it, as where its commands are only the
-    setpoints.
+def _link(record: Record) -> tuple[float, float] | None:
+    """The time from a command to the setpoint, s, and its standard deviation. None: the log does not show it, as where
+    its commands are only the setpoints.
     """
     if not record.has("command") or not np.ptp(record.streams["command"].values[:, 0]):
         return None
-    return setpoint_delay(record)
+    late = setpoint_delay(record)
+    # between two samples, every time is equally likely
+    return None if late is None else (late, float(np.hypot(DELAY_SIGMA, 1 / record.streams["setpoint"].rate / 12**0.5)))
 
 
 def felt(seen: dict[str, np.ndarray], response: ThrustResponse | None) -> dict[str, np.ndarray]:

@@ -66,7 +66,9 @@ class ThrustResponse:
     """Why the lag is not to be believed. Empty: it is."""
 
 
-def thrust_response(records: Sequence[Record], lag: float, delay: float | None = None) -> ThrustResponse | None:
+def thrust_response(
+    records: Sequence[Record], lag: float, delay: float | None = None, spread: float = DELAY_SIGMA
+) -> ThrustResponse | None:
     """The response of the thrust in flights with commands and accelerometer. None: no flight has both, or no command
     tells the thrust.
 
@@ -74,6 +76,7 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
         records: the flights, checked.
         lag: the time constant from which the fit begins, s.
         delay: the delay from a command to the motors, s, if it is known.
+        spread: the standard deviation of this delay, s.
     """
     told = [r for r in records if r.has("command", "specific_force")]
     told = [r for r in told if np.ptp(r.streams["command"].values[:, 0]) > 0]
@@ -94,7 +97,7 @@ def thrust_response(records: Sequence[Record], lag: float, delay: float | None =
 
     level = float(np.median(seen) / np.median(foretold(np.array([1.0, np.log(lag), 0.0, np.log(UNFILTERED)]))))
     late = 0.02 if delay is None else delay
-    free = np.array([STEADY, 1.0, LATEST if delay is None else DELAY_SIGMA, FILTER_SPREAD])
+    free = np.array([STEADY, 1.0, LATEST if delay is None else spread, FILTER_SPREAD])
     fits = []
     controller = all(record.kind in (OURS, BLACKBOX) for record in told)  # Betaflight filters its accelerometer
     for stage in (FORCE_FILTER,) if controller else (FORCE_FILTER, UNFILTERED):

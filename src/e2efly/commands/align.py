@@ -34,7 +34,7 @@ class Align:
 
     logs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE [FILE ...]")]]
     """Logs with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, or a Betaflight blackbox
-    log."""
+    log. A blackbox beside our .mcap of the same flight is laid over it."""
     vehicle: str = "vis_r"
     """The vehicle to align: a name or a .toml file. Everything except delay, rate loop and motor lag stays as it
     is."""
@@ -60,6 +60,7 @@ def run(options: Align) -> int:
     from e2efly.alignment.checks import checked
     from e2efly.alignment.identification import driver_of
     from e2efly.alignment.vehicle_file import merged, write_vehicle
+    from e2efly.logs.blackbox_merge import with_blackboxes
     from e2efly.logs.readers import read_flights
     from e2efly.simulation.device import prepare
     from e2efly.viewing.alignment_plots import plot_alignment
@@ -71,7 +72,7 @@ def run(options: Align) -> int:
     if options.pose_delay is not None and not 0 <= options.pose_delay <= 1:
         raise ValueError(f"--pose-delay is {options.pose_delay}; accepted: 0 to 1 s")
     vehicle, reading = load_vehicle(options.vehicle), options.read.reading()
-    read = [record for path in options.logs for record in read_flights(path, reading)]
+    read = with_blackboxes([record for path in options.logs for record in read_flights(path, reading)])
     show_notes(read, console)
     driver_of(read, step=True)
     records = checked(read, vehicle)
