@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from e2efly.alignment.comparison import GRID, at_times, attitudes, common_times, pearson, rates, smooth, turning
+from e2efly.alignment.damage_checks import POSES
 from e2efly.alignment.unit_checks import AGREE
 from e2efly.logs.blackbox import vertex
 from e2efly.logs.recording import Record, Stream
 
-POSES = ("position", "velocity", "quaternion")
 DRIFT, UNEVEN = 0.02, 0.05
 """`DRIFT`: constant change of the offset between two clocks during a flight from which on it is corrected, s. `UNEVEN`:
 largest deviation from a constant change, s."""

@@ -17,6 +17,7 @@ LOST = 1e-3
 """Largest fraction of a stream that may be outside these limits. Such samples are left out."""
 LEAST_VOLTS = 1.0
 """Lowest plausible voltage of a battery, V. Lower values mean that there is no sensor."""
+POSES = ("position", "velocity", "quaternion")
 FROZEN_S, USUAL_RUNS = 0.25, 5
 """Time for which a stream that repeats its last sample in the air is frozen, s, and by how many times that exceeds how
 long it usually repeats one: poses are often held until the next."""
@@ -101,29 +102,31 @@ def without_frozen(record: Record, flying: tuple[float, float]) -> Record:
     Raises:
         ValueError: for a stream that does so for most of the flight.
     """
-    streams, notes = dict(record.streams), list(record.notes)
-    for name in ("position", "velocity", "quaternion"):
+    streams, seconds, shares = dict(record.streams), dict[str, float](), dict[str, float]()
+    for name in POSES:
         if not record.has(name):
             continue
         stream = record.streams[name]
-        same = np.concatenate([[False], np.all(np.diff(stream.values, axis=0) == 0, axis=1)])
-        begins = np.flatnonzero(~same)
-        runs = np.diff(np.append(begins, len(same)))
-        ends = stream.time[begins + runs - 1]
+        begins = np.flatnonzero(np.append(True, np.any(np.diff(stream.values, axis=0) != 0, axis=1)))
+        runs = np.diff(np.append(begins, len(stream.time)))
+        first, last = stream.time[begins], stream.time[begins + runs - 1]
         long = (runs > USUAL_RUNS * np.median(runs)) & (
-            np.minimum(ends, flying[1]) - np.maximum(stream.time[begins], flying[0]) > FROZEN_S
+            np.minimum(last, flying[1]) - np.maximum(first, flying[0]) > FROZEN_S
         )
-        lost = np.zeros(len(same), bool)
-        for begin, run in zip(begins[long], runs[long], strict=True):
-            lost[begin + 1 : begin + run] = True
-        inside = (stream.time >= flying[0]) & (stream.time <= flying[1])
-        if lost[inside].sum() > 0.5 * inside.sum():
-            raise ValueError(
-                f"{record.path}: {name} repeats a sample for {percent(lost[inside].mean())} of the flight; accepted: "
-                f"what was measured throughout, or the log --without {name}"
-            )
+        lost = np.repeat(long, runs)
+        lost[begins] = False
         if lost.any():
             streams[name] = Stream(stream.time[~lost], stream.values[~lost])
-            seconds = float(np.sum((ends - stream.time[begins])[long]))
-            notes.append(f"{name} repeats a sample for {seconds:.1f} s of the flight: left out there")
-    return replace(record, streams=streams, notes=tuple(notes))
+            seconds[name] = float(np.sum((last - first)[long]))
+            inside = (stream.time >= flying[0]) & (stream.time <= flying[1])
+            shares[name] = float(lost[inside].mean())
+    if not seconds:
+        return record
+    repeats = f"{' and '.join(seconds)} repeat a sample for"
+    if max(shares.values()) > 0.5:
+        raise ValueError(
+            f"{record.path}: {repeats} {percent(max(shares.values()))} of the flight; accepted: what was measured "
+            f"throughout, or the log --without {' '.join(shares)}"
+        )
+    note = f"{repeats} {max(seconds.values()):.1f} s of the flight, which is left out of them"
+    return replace(record, streams=streams, notes=(*record.notes, note))

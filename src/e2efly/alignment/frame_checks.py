@@ -18,9 +18,10 @@ from e2efly.vehicles.gravity import GRAVITY
 
 FIT, BETTER = 0.5, 0.25
 """`FIT`: lowest correlation, on each axis with enough motion, at which two streams agree. `BETTER`: a remedy that leaves
-less than this share of the disagreement shows that the frames are wrong, even where the streams agree by `FIT`."""
+less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
+`FIT`."""
 SMALL = 0.05
-"""Disagreement of a clean log: the search for remedies is not worth while below it."""
+"""Disagreement that is not worth a search for remedies, and the least by which one has to reduce it."""
 ENOUGH = {"turn": 0.15, "steer": 0.15, "push": 0.3, "slide": 0.1}
 """Smallest motion that shows an axis, as a standard deviation: rad/s, rad/s, m/s^2, m/s."""
 LEAST_S = 1.5
@@ -30,7 +31,8 @@ ANSWER_S = 0.25
 STEP, WIDTH = 0.02, 11
 """Time between the points at which frames are compared, s, and points over which streams are averaged: 0.2 s."""
 SIMPLE = 0.01
-"""What a stream that a remedy changes has to be worth, in correlation: among equals, the simplest is chosen."""
+"""What each stream that a remedy changes, and its strangeness, has to be worth in correlation: an axis that hardly moves
+shows nothing."""
 RELATIONS = {
     "turn": {"body_rate", "quaternion"},
     "steer": {"body_rate"},
@@ -41,14 +43,15 @@ RELATIONS = {
 }
 """The streams of each comparison."""
 TOLD = {
-    "turn": ("body_rate", "the turning of quaternion"),
+    "turn": ("body_rate", "the turning of quaternion", "body_rate", "quaternion"),
     "steer": ("body_rate", "the commanded body rates"),
-    "push": ("specific_force", "the acceleration of the poses"),
+    "push": ("specific_force", "the acceleration of the poses", "specific_force", "quaternion", "velocity"),
     "weight": ("specific_force", "gravity, turned by quaternion,"),
     "up": ("specific_force", "the thrust along body z"),
-    "slide": ("velocity", "the change of position"),
+    "slide": ("velocity", "the change of position", "velocity", "position"),
 }
-"""What is compared, for people."""
+"""What is compared, for people, and the streams without which it never is: where they are there, and nothing shows, the
+notes say so."""
 
 Values = Mapping[str, np.ndarray]
 """Streams by name, (n, k), all at the same times."""
@@ -64,6 +67,8 @@ class Remedy:
     """By stream, the matrix (k, k) that makes our entries of theirs."""
     turns: bool = False
     """Whether velocities are turned from the body into the world."""
+    strange: int = 0
+    """How unlikely it is: 0 for a convention, 1 for axes in which a sensor may be mounted, 2 for others."""
     weighs: bool = False
     """Whether gravity is added to the specific force."""
 
@@ -108,20 +113,29 @@ def in_one_frame(record: Record, part: Record) -> Record:
     """
     values = _values(part)
     usual = _misfits(values)
+    blind = [
+        f"{one} cannot be checked against {other}: there is too little motion"
+        for name, (one, other, *needed) in TOLD.items()
+        if needed and record.has(*needed) and name not in usual
+    ]
+    record = replace(record, notes=(*record.notes, *blind))
     total, at = sum(usual.values()), max(usual, key=lambda name: usual[name], default="")
     wrong = any(misfit > 1 - FIT for name, misfit in usual.items() if name != "steer")
     if not wrong and total < SMALL:
         return record
-    best, least = None, np.inf if wrong else BETTER * total
+    best, least = None, np.inf
     for remedy in _remedies():
         if remedy.needs <= set(values):
-            misfits = {**usual, **_misfits(remedy.on(values), remedy.needs)}
-            left = sum(misfits.values()) + SIMPLE * len(remedy.needs)
-            if left < least and all(misfit <= 1 - FIT for misfit in misfits.values()):
+            new = _misfits(remedy.on(values), remedy.needs)
+            before, after = sum(usual.get(name, 0.0) for name in new), sum(new.values())
+            left = total - before + after + SIMPLE * (len(remedy.needs) + remedy.strange)
+            helps = before - after > SMALL and after < BETTER * before
+            fits = all(misfit <= 1 - FIT for misfit in {**usual, **new}.values())
+            if left < least and fits and (wrong or helps):
                 best, least = remedy, left
     if best is None and not wrong:
         return record
-    one, other = TOLD[at]
+    one, other, *_ = TOLD[at]
     problem = f"{one} does not agree with {other} (by {1 - usual[at]:.2f}, where 1 is the same)"
     if best is None:
         raise ValueError(
@@ -222,13 +236,17 @@ def _signed(n: int = 3) -> Iterator[np.ndarray]:
 
 FRD = np.diag([1.0, -1.0, -1.0])
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-_HALF = float(np.sqrt(0.5))
-WORLD = np.array([[0.0, -1, -1, 0], [1, 0, 0, 1], [1, 0, 0, -1], [0, 1, -1, 0]]) * _HALF
-"""By which (0, 1, 1, 0) / sqrt 2 is multiplied from the right: from NED into ENU."""
+WORLD = np.array([[0.0, -1, -1, 0], [1, 0, 0, 1], [1, 0, 0, -1], [0, -1, 1, 0]]) * np.sqrt(0.5)
+"""Matrix of (0, 1, 1, 0) / sqrt 2 times a quaternion: a world NED becomes ENU."""
 BODY = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, -1, 0]])
-"""Times (0, 1, 0, 0): from FRD into FLU."""
+"""Matrix of a quaternion times (0, 1, 0, 0): a body FRD becomes FLU."""
 ORDER = np.eye(4)[[3, 0, 1, 2]]
 CONJUGATE = np.diag([1.0, -1.0, -1.0, -1.0])
+
+
+def _strangeness(m: np.ndarray) -> int:
+    """How unlikely axes are, as `Remedy.strange`."""
+    return 0 if any(np.array_equal(m, known) for known in (FRD, NED)) else 1 if np.linalg.det(m) > 0 else 2
 
 
 @cache
@@ -255,5 +273,5 @@ def _remedies() -> tuple[Remedy, ...]:
     for names in (("body_rate",), ("specific_force",), ("body_rate", "specific_force"), ("position",), ("velocity",), ("position", "velocity")):
         for m in _signed():
             axes = "the axes are FRD" if np.array_equal(m, FRD) else "the world is NED" if np.array_equal(m, NED) else "axes and signs are others"
-            found.append(Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m)))
+            found.append(Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m), strange=_strangeness(m)))
     return tuple(found)
