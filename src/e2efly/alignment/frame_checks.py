@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,19 +21,22 @@ FIT, BETTER = 0.5, 0.25
 """`FIT`: lowest correlation, on each axis with enough motion, at which two streams agree. `BETTER`: a remedy that leaves
 less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
 `FIT`."""
-SMALL = 0.05
-"""Disagreement that is not worth a search for remedies, and the least by which one has to reduce it."""
+SMALL = 0.0005
+"""Disagreement that shows nothing."""
 ENOUGH = {"turn": 0.15, "steer": 0.15, "push": 0.3, "slide": 0.1}
 """Smallest motion that shows an axis, as a standard deviation: rad/s, rad/s, m/s^2, m/s."""
+FAINT, CLEAR = 0.02, 0.9
+"""Less motion than `ENOUGH`, by this factor, shows an axis if the correlation is as strong as `CLEAR`, whatever its
+sign."""
 LEAST_S = 1.5
 """Length of the shortest flight whose frames are checked, s."""
 ANSWER_S = 0.25
 """Within which body rates answer to commands, s."""
 STEP, WIDTH = 0.02, 11
 """Time between the points at which frames are compared, s, and points over which streams are averaged: 0.2 s."""
-SIMPLE = 0.01
-"""What each stream that a remedy changes, and its strangeness, has to be worth in correlation: an axis that hardly moves
-shows nothing."""
+SIMPLE = 0.1
+"""Share of the disagreement that stays which each stream that a remedy changes, and its strangeness, has to be worth: an
+axis that hardly moves shows nothing."""
 RELATIONS = {
     "turn": {"body_rate", "quaternion"},
     "steer": {"body_rate"},
@@ -57,6 +61,18 @@ Values = Mapping[str, np.ndarray]
 """Streams by name, (n, k), all at the same times."""
 
 
+class Misfit(NamedTuple):
+    """How much two streams disagree."""
+
+    worst: float
+    """1 less the correlation of the axis that agrees least."""
+    axes: int = 1
+    """Number of axes that are compared."""
+
+
+NEVER = Misfit(np.inf)
+
+
 @dataclass(frozen=True, eq=False)
 class Remedy:
     """What makes our streams of those of a log."""
@@ -68,7 +84,7 @@ class Remedy:
     turns: bool = False
     """Whether velocities are turned from the body into the world."""
     strange: int = 0
-    """How unlikely it is: 0 for a convention, 1 for axes in which a sensor may be mounted, 2 for others."""
+    """How unlikely it is: 0 for a convention, 1 for one mistake about axes, 2 for several."""
     weighs: bool = False
     """Whether gravity is added to the specific force."""
 
@@ -119,24 +135,26 @@ def in_one_frame(record: Record, part: Record) -> Record:
         if needed and record.has(*needed) and name not in usual
     ]
     record = replace(record, notes=(*record.notes, *blind))
-    total, at = sum(usual.values()), max(usual, key=lambda name: usual[name], default="")
-    wrong = any(misfit > 1 - FIT for name, misfit in usual.items() if name != "steer")
-    if not wrong and total < SMALL:
-        return record
+    at = max(usual, key=lambda name: usual[name].worst, default="")
+    sure = {name for name in usual if name != "steer"}  # a vehicle need not do what it is told
+    wrong = any(usual[name].worst > 1 - FIT for name in sure)
     best, least = None, np.inf
     for remedy in _remedies():
         if remedy.needs <= set(values):
-            new = _misfits(remedy.on(values), remedy.needs)
-            before, after = sum(usual.get(name, 0.0) for name in new), sum(new.values())
-            left = total - before + after + SIMPLE * (len(remedy.needs) + remedy.strange)
-            helps = before - after > SMALL and after < BETTER * before
-            fits = all(misfit <= 1 - FIT for misfit in {**usual, **new}.values())
+            new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
+            seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
+            before, after = (sum(misfits[name].worst for name in seen) for misfits in (usual, new))
+            left = sum(misfit.worst for misfit in new.values()) + SIMPLE * max(after, SMALL) * (
+                len(remedy.needs) + remedy.strange
+            )
+            fits = all(new[name].worst <= 1 - FIT and new[name].axes >= usual[name].axes for name in sure)
+            helps = before - after > (SMALL if seen <= sure else 1.0) and after < BETTER * before
             if left < least and fits and (wrong or helps):
                 best, least = remedy, left
     if best is None and not wrong:
         return record
     one, other, *_ = TOLD[at]
-    problem = f"{one} does not agree with {other} (by {1 - usual[at]:.2f}, where 1 is the same)"
+    problem = f"{one} does not agree with {other} (by {1 - usual[at].worst:.2f}, where 1 is the same)"
     if best is None:
         raise ValueError(
             f"{record.path}: {problem}, whatever the order of the axes and their signs; accepted: streams of one "
@@ -183,23 +201,21 @@ def _values(record: Record) -> Values:
     return values
 
 
-def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[str, float]:
-    """By relation that the flight shows and that any of the changed streams is part of: 1 less the correlation of the
-    axis that agrees least.
-    """
-    found = dict[str, float]()
+def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[str, Misfit]:
+    """By relation that the flight shows, of those that any of the changed streams is part of."""
+    found = dict[str, Misfit]()
     asked = {name for name, streams in RELATIONS.items() if streams & set(changed)}
     gyro, q, force, velocity, position = (
         values.get(n) for n in ("body_rate", "quaternion", "specific_force", "velocity", "position")
     )
 
     def compare(name: str, one: np.ndarray, other: np.ndarray, late: int = 0) -> None:
-        lively = np.flatnonzero(np.maximum(one.std(0), other.std(0)) > ENOUGH[name])
-        shifts = [
-            min(pearson(one[k:, i], other[: len(other) - k, i]) for i in lively) for k in range(late + 1) if len(lively)
-        ]
-        if shifts:
-            found[name] = 1 - max(shifts)
+        moves = np.maximum(one.std(0), other.std(0)) / ENOUGH[name]
+        for k in range(late + 1):
+            seen = np.array([pearson(a, b) for a, b in zip(one[k:].T, other[: len(other) - k].T, strict=True)])
+            told = seen[(moves > 1) | ((moves > FAINT) & (np.abs(seen) > CLEAR))]
+            if len(told) and 1 - told.min() < found.get(name, NEVER).worst:
+                found[name] = Misfit(1 - float(told.min()), len(told))
 
     if "turn" in asked and gyro is not None and q is not None:
         compare("turn", _averaged(gyro), _averaged(turning(q, STEP)))
@@ -209,14 +225,14 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
         compare("slide", _averaged(velocity), np.gradient(_averaged(position), STEP, axis=0))
     if "up" in asked and force is not None:
         size = float(np.median(np.linalg.norm(force, axis=1)))
-        found["up"] = 1 - float(np.median(force[:, 2])) / max(size, 1e-9)
+        found["up"] = Misfit(1 - float(np.median(force[:, 2])) / max(size, 1e-9))
     if "push" in asked and force is not None and q is not None and (velocity is not None or position is not None):
         turned = Quat(*q.T).rotate(Vec3(*force.T))
         felt = _averaged(np.stack([turned.x, turned.y, turned.z], -1)) - np.array([0.0, 0.0, GRAVITY])
         moved = np.gradient(_averaged(position), STEP, axis=0) if velocity is None else _averaged(velocity)
         acceleration = np.gradient(moved, STEP, axis=0)
         compare("push", felt, acceleration)
-        found["weight"] = min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0)
+        found["weight"] = Misfit(min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0))
     return found
 
 
@@ -244,9 +260,11 @@ ORDER = np.eye(4)[[3, 0, 1, 2]]
 CONJUGATE = np.diag([1.0, -1.0, -1.0, -1.0])
 
 
-def _strangeness(m: np.ndarray) -> int:
+def _strangeness(m: np.ndarray, usual: np.ndarray) -> int:
     """How unlikely axes are, as `Remedy.strange`."""
-    return 0 if any(np.array_equal(m, known) for known in (FRD, NED)) else 1 if np.linalg.det(m) > 0 else 2
+    if np.array_equal(m, usual):
+        return 0
+    return 1 if np.linalg.det(m) > 0 or np.trace(m) == 1 else 2  # turned, or one axis negated, or two swapped
 
 
 @cache
@@ -272,6 +290,7 @@ def _remedies() -> tuple[Remedy, ...]:
     found.append(Remedy("values without gravity", weighs=True))
     for names in (("body_rate",), ("specific_force",), ("body_rate", "specific_force"), ("position",), ("velocity",), ("position", "velocity")):
         for m in _signed():
-            axes = "the axes are FRD" if np.array_equal(m, FRD) else "the world is NED" if np.array_equal(m, NED) else "axes and signs are others"
-            found.append(Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m), strange=_strangeness(m)))
+            usual = FRD if names[0] in ("body_rate", "specific_force") else NED
+            axes = "axes and signs are others" if not np.array_equal(m, usual) else "the axes are FRD" if usual is FRD else "the world is NED"
+            found.append(Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m), strange=_strangeness(m, usual)))
     return tuple(found)

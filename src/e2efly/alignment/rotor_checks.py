@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from e2efly.alignment.comparison import GRID, at_times, common_times, pearson, smooth
-from e2efly.alignment.unit_checks import AGREE, UNIT_OFF, scaled
+from e2efly.alignment.unit_checks import AGREE, scaled
 from e2efly.logs.recording import KINDS, Record
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
@@ -17,8 +17,10 @@ SEEN = 0.12
 SPEED_OFF, THRUST_OFF = 1.33, 2.0
 """Ratios from which on rotor speeds and commanded thrust have another unit. The file of a vehicle that is not known yet
 is itself off by tens of percent."""
-NEAR = 0.1
-"""By how much a ratio may differ from that of a unit, as a logarithm."""
+NEAR, FITS = 0.1, 0.35
+"""By how much a ratio may differ from that of a unit, as a logarithm: of rotor speeds, and of thrusts."""
+MOVED = 1.0
+"""Distance that shows a flight, m."""
 RPM = 30 / np.pi
 SPEEDS = {"rpm": RPM, "revolutions a second": RPM / 60} | {
     f"{name}, by {pairs} pairs of poles": pairs * RPM / over for name, over in (("eRPM/100", 100), ("eRPM", 1)) for pairs in (7, 6, 8, 11, 12, 14)
@@ -49,7 +51,8 @@ def check_rotor_speed_unit(record: Record, vehicle: Vehicle) -> None:
         return
     width = max(round(0.1 * stream.rate), 3)
     push, seen = smooth(turning[flying, None] ** 2, width)[:, 0], smooth(force[flying, None], width)[:, 0]
-    if ratio < 0.5 and not pearson(push, seen) > AGREE:
+    moved = record.has("position") and np.ptp(record.streams["position"].values, axis=0).max() > MOVED
+    if ratio < 0.5 and not moved and not pearson(push, seen) > AGREE:
         return  # the rotors may idle on the ground
     unit = min(SPEEDS, key=lambda u: abs(np.log(ratio / SPEEDS[u])))
     fits = abs(np.log(ratio / SPEEDS[unit])) < NEAR
@@ -83,9 +86,10 @@ def check_commanded_thrust(record: Record, vehicle: Vehicle) -> Record:
     top = 4 * float(vehicle.rotor_thrust_max) / float(vehicle.mass)
     units = {"N": float(vehicle.mass), "g": 1 / GRAVITY}
     if np.all(np.abs(asked) <= 1.05):
-        units = {"0 to 1 of the largest thrust": 1 / top}
-    unit = min(units, key=lambda u: abs(np.log(max(abs(ratio), 1e-9) / units[u])))
-    fits = abs(np.log(max(abs(ratio), 1e-9) / units[unit])) < (np.log(UNIT_OFF) if len(units) == 1 else 2 * NEAR)
+        units["0 to 1 of the largest thrust"] = 1 / top
+    off = {unit: abs(np.log(max(abs(ratio), 1e-9) / expected)) for unit, expected in units.items()}
+    unit = min(off, key=lambda u: off[u])
+    fits = off[unit] < FITS
     factor = np.sign(ratio) / (units[unit] if fits else max(abs(ratio), 1e-9))
     said = (
         f"the commanded thrust is {ratio:.3g} times the specific force along body z: it looks like "
@@ -94,7 +98,7 @@ def check_commanded_thrust(record: Record, vehicle: Vehicle) -> Record:
     remedy = f"m/s^2 (--columns cmd_thrust=cmd_thrust*{factor:.5g}, in a CSV file with its own name behind the =)"
     if not 1 / THRUST_OFF < ratio < THRUST_OFF:
         raise ValueError(f"{record.path}: {said}; accepted: {remedy}, or the log --without command")
-    if unit == "N" and fits and abs(np.log(ratio / units["N"])) < abs(np.log(ratio)) - NEAR:
+    if unit == "N" and fits and off["N"] < abs(np.log(ratio)) - NEAR:
         return replace(record, notes=(*record.notes, f"{said}, the vehicle's mass; if so: {remedy}"))
     return record
 
