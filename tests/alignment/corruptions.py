@@ -31,7 +31,11 @@ def _values(name: str, of: Callable[[np.ndarray], np.ndarray]) -> Callable[[Reco
 
 def with_values(record: Record, changes: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Record:
     """The record with the values of some of its streams changed."""
-    streams = {k: Stream(record.streams[k].time, of(record.streams[k].values)) for k, of in changes.items() if k in record.streams}
+    streams = {
+        k: Stream(record.streams[k].time, of(record.streams[k].values))
+        for k, of in changes.items()
+        if k in record.streams
+    }
     return replace(record, streams={**record.streams, **streams})
 
 
@@ -92,37 +96,97 @@ def _thrust(unit: Callable[[Vehicle], float]) -> Callable[[Record, Vehicle], Rec
 
 
 def _copied(name: str) -> Corruption:
-    return Corruption(f"one column in all of {name}", (name,), _values(name, lambda x: x[:, [0, 0, 0, 0]]), f"{name} is the same as .1")
+    return Corruption(
+        f"one column in all of {name}",
+        (name,),
+        _values(name, lambda x: x[:, [0, 0, 0, 0]]),
+        f"{name} is the same as .1",
+    )
 
 
 CORRUPTIONS = (
-    Corruption("quaternion xyzw", ("quaternion",), _values("quaternion", lambda q: q[:, [1, 2, 3, 0]]), "qw=qz qx=qw qy=qx qz=qy"),
-    Corruption("quaternion world to body", ("quaternion",), _values("quaternion", lambda q: q * [1, -1, -1, -1]), r"qx=qx\*-1 qy=qy\*-1 qz=qz\*-1"),
+    Corruption(
+        "quaternion xyzw",
+        ("quaternion",),
+        _values("quaternion", lambda q: q[:, [1, 2, 3, 0]]),
+        "qw=qz qx=qw qy=qx qz=qy",
+    ),
+    Corruption(
+        "quaternion world to body",
+        ("quaternion",),
+        _values("quaternion", lambda q: q * [1, -1, -1, -1]),
+        r"qx=qx\*-1 qy=qy\*-1 qz=qz\*-1",
+    ),
     Corruption("poses of NED and FRD", ("quaternion",), _poses_ned(True), "world NED and a body FRD.* corrected"),
-    Corruption("poses and IMU of NED and FRD", ("quaternion", "body_rate"), _poses_ned(True, imu=True), "world is NED and the body FRD.* corrected"),
+    Corruption(
+        "poses and IMU of NED and FRD",
+        ("quaternion", "body_rate"),
+        _poses_ned(True, imu=True),
+        "world is NED and the body FRD.* corrected",
+    ),
     Corruption("poses of NED", ("quaternion",), _poses_ned(False), "world NED.* corrected"),
-    Corruption("positions and velocities of NED", ("position",), lambda r, _: with_values(r, {"position": _ned, "velocity": _ned}), r"px=py py=px pz=pz\*-1"),
-    Corruption("velocity in the body's axes", ("velocity", "quaternion"), _in_the_body, "velocities are in the body's axes.* corrected"),
+    Corruption(
+        "positions and velocities of NED",
+        ("position",),
+        lambda r, _: with_values(r, {"position": _ned, "velocity": _ned}),
+        r"px=py py=px pz=pz\*-1",
+    ),
+    Corruption(
+        "velocity in the body's axes",
+        ("velocity", "quaternion"),
+        _in_the_body,
+        "velocities are in the body's axes.* corrected",
+    ),
     Corruption("position in cm", ("position",), _values("position", lambda x: x * 100), r"px=px\*0.01"),
-    Corruption("position and velocity in cm", ("position",), lambda r, _: with_values(r, dict.fromkeys(("position", "velocity"), lambda x: x * 100)), r"\*0.01"),
-    Corruption("position, x and y swapped", ("position",), _values("position", lambda x: x[:, [1, 0, 2]]), "px=py py=px"),
+    Corruption("velocity in cm/s", ("velocity",), _values("velocity", lambda x: x * 100), r"vx=vx\*0.01"),
+    Corruption(
+        "position, x and y swapped", ("position",), _values("position", lambda x: x[:, [1, 0, 2]]), "px=py py=px"
+    ),
     Corruption("position, z negated", ("position",), _values("position", lambda x: x * [1, 1, -1]), r"pz=pz\*-1"),
-    Corruption("velocity, y and z swapped", ("velocity",), _values("velocity", lambda x: x[:, [0, 2, 1]]), "vy=vz vz=vy"),
+    Corruption(
+        "velocity, y and z swapped", ("velocity",), _values("velocity", lambda x: x[:, [0, 2, 1]]), "vy=vz vz=vy"
+    ),
     Corruption("velocity, y negated", ("velocity",), _values("velocity", lambda x: x * [1, -1, 1]), r"vy=vy\*-1"),
     Corruption("thrust in N", ("command",), _thrust(lambda v: float(v.mass)), "it looks like N"),
-    Corruption("thrust in 0 to 1", ("command",), _thrust(lambda v: float(v.mass / (4 * v.rotor_thrust_max))), "0 to 1 of the largest thrust"),
-    Corruption("rotor speeds in rpm", ("rotor_speed",), _values("rotor_speed", lambda x: x * 30 / np.pi), r"n1=n1\*0.10472"),
-    Corruption("rotor speeds in eRPM/100", ("rotor_speed",), _values("rotor_speed", lambda x: x * 30 / np.pi * 7 / 100), "eRPM/100, by 7 pairs of poles"),
+    Corruption(
+        "thrust in 0 to 1",
+        ("command",),
+        _thrust(lambda v: float(v.mass / (4 * v.rotor_thrust_max))),
+        "0 to 1 of the largest thrust",
+    ),
+    Corruption(
+        "rotor speeds in rpm", ("rotor_speed",), _values("rotor_speed", lambda x: x * 30 / np.pi), r"n1=n1\*0.10472"
+    ),
+    Corruption(
+        "rotor speeds in eRPM/100",
+        ("rotor_speed",),
+        _values("rotor_speed", lambda x: x * 30 / np.pi * 7 / 100),
+        "eRPM/100, by 7 pairs of poles",
+    ),
     _copied("rotor_speed"),
     _copied("motor"),
     Corruption("poses frozen for a tenth", ("position",), _frozen(0.4, 0.5), "repeat a sample for .* left out of them"),
-    Corruption("poses frozen from a tenth on", ("position",), _frozen(0.1, 1.1), "repeat a sample for .*--without position velocity quaternion"),
-    Corruption("clock of the poses 1 % fast", ("quaternion", "body_rate"), _fast, r"clock is [01]\.?\d* % fast .* corrected"),
+    Corruption(
+        "poses frozen from a tenth on",
+        ("position",),
+        _frozen(0.1, 1.1),
+        "repeat a sample for .*--without position velocity quaternion",
+    ),
+    Corruption(
+        "clock of the poses 1 % fast", ("quaternion", "body_rate"), _fast, r"clock is [01]\.?\d* % fast .* corrected"
+    ),
     Corruption("gyroscope in deg/s", ("body_rate",), _values("body_rate", np.degrees), r"wx=wx\*0.0174533"),
-    Corruption("gyroscope, x and y swapped", ("body_rate",), _values("body_rate", lambda x: x[:, [1, 0, 2]]), "wx=wy wy=wx"),
+    Corruption(
+        "gyroscope, x and y swapped", ("body_rate",), _values("body_rate", lambda x: x[:, [1, 0, 2]]), "wx=wy wy=wx"
+    ),
     Corruption("gyroscope, x negated", ("body_rate",), _values("body_rate", lambda x: x * [-1, 1, 1]), r"wx=wx\*-1"),
     Corruption("gyroscope of FRD", ("body_rate",), _values("body_rate", _frd), r"wy=wy\*-1 wz=wz\*-1"),
     Corruption("accelerometer of FRD", ("specific_force",), _values("specific_force", _frd), r"ay=ay\*-1 az=az\*-1"),
-    Corruption("IMU of FRD", ("body_rate", "specific_force"), lambda r, _: with_values(r, dict.fromkeys(("body_rate", "specific_force"), _frd)), r"wy=wy\*-1 wz=wz\*-1 ay=ay\*-1 az=az\*-1"),
-)  # fmt: skip
+    Corruption(
+        "IMU of FRD",
+        ("body_rate", "specific_force"),
+        lambda r, _: with_values(r, dict.fromkeys(("body_rate", "specific_force"), _frd)),
+        r"wy=wy\*-1 wz=wz\*-1 ay=ay\*-1 az=az\*-1",
+    ),
+)
 """All of them."""

@@ -1,5 +1,5 @@
-"""Checks whether a flight can be used for identification: damage, units, frames, clocks, order of the rotors, duplicates.
-Each error names its cause.
+"""Checks whether a flight can be used for identification: damage, units, frames, clocks, order of the rotors,
+duplicates. Each error names its cause.
 """
 
 import hashlib
@@ -154,5 +154,3 @@ def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
     start, end = start + 0.5, end - 0.5  # neither the ground's effect nor the landing
     note = f"used from {start - record.span[0]:.1f} to {end - record.span[0]:.1f} s, when it is in the air"
     return replace(record.during(start, end), notes=(*record.notes, note))
-
-

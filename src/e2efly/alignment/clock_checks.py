@@ -40,8 +40,8 @@ def with_clock_rate(record: Record) -> Record:
     if len(time) * COARSE < 0.3 * min(np.ptp(span) for span in spans.values()):
         (a, b), (c, d) = spans.values()
         raise ValueError(
-            f"{record.path}: body_rate is from {a:.6g} to {b:.6g} s and quaternion from {c:.6g} to {d:.6g} s; accepted: "
-            "times by one clock, or the log --without quaternion"
+            f"{record.path}: body_rate is from {a:.6g} to {b:.6g} s and quaternion from {c:.6g} to {d:.6g} s; "
+            "accepted: times by one clock, or the log --without quaternion"
         )
     length = len(time) * COARSE
     if FASTEST * length < 2 * DRIFT:
@@ -84,8 +84,9 @@ def on_one_clock(record: Record) -> Record:
         slope, middle = (float(x) for x in np.polyfit(at - start, late, 1))
         if np.max(np.abs(late - np.polyval((slope, middle), at - start))) > UNEVEN:
             raise ValueError(
-                f"{record.path}: the poses are {1e3 * late.min():.0f} to {1e3 * late.max():.0f} ms behind the gyroscope, "
-                "and their clocks do not run apart evenly; accepted: clocks that differ by an offset and a rate"
+                f"{record.path}: the poses are {1e3 * late.min():.0f} to {1e3 * late.max():.0f} ms behind the "
+                "gyroscope, and their clocks do not run apart evenly; accepted: clocks that differ by an offset and a "
+                "rate, or a part of the log (LOG:BEGIN-END)"
             )
         if abs(slope) * np.ptp(at) > DRIFT:
             return _by_clock(record, start, slope, middle)

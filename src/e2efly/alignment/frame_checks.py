@@ -18,8 +18,8 @@ from e2efly.logs.recording import KINDS, Record, Stream
 from e2efly.vehicles.gravity import GRAVITY
 
 FIT, BETTER = 0.5, 0.25
-"""`FIT`: lowest correlation, on each axis with enough motion, at which two streams agree. `BETTER`: a remedy that leaves
-less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
+"""`FIT`: lowest correlation, on each axis with enough motion, at which two streams agree. `BETTER`: a remedy that
+leaves less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
 `FIT`."""
 SMALL = 0.0005
 """Disagreement that shows nothing."""
@@ -35,8 +35,8 @@ ANSWER_S = 0.25
 STEP, WIDTH = 0.02, 11
 """Time between the points at which frames are compared, s, and points over which streams are averaged: 0.2 s."""
 SIMPLE = 0.1
-"""Share of the disagreement that stays which each stream that a remedy changes, and its strangeness, has to be worth: an
-axis that hardly moves shows nothing."""
+"""Share of the disagreement that stays which each stream that a remedy changes, and its strangeness, has to be worth:
+an axis that hardly moves shows nothing."""
 RELATIONS = {
     "turn": {"body_rate", "quaternion"},
     "steer": {"body_rate"},
@@ -162,8 +162,8 @@ def in_one_frame(record: Record, part: Record) -> Record:
         )
     if best.weighs:
         raise ValueError(
-            f"{record.path}: {problem}: it looks like {best.what}; accepted: {KINDS['specific_force'].what}, or the log "
-            "--without specific_force"
+            f"{record.path}: {problem}: it looks like {best.what}; accepted: {KINDS['specific_force'].what}, or the "
+            "log --without specific_force"
         )
     if best.columns:
         raise ValueError(
@@ -195,7 +195,9 @@ def _values(record: Record) -> Values:
     time = common_times(record, *names, step=STEP)
     if len(time) * STEP < LEAST_S:
         return {}
-    values = {n: attitudes(record.streams[n], time) if n == "quaternion" else at_times(record.streams[n], time) for n in names}
+    values = {
+        n: attitudes(record.streams[n], time) if n == "quaternion" else at_times(record.streams[n], time) for n in names
+    }
     if asked:
         values["asked"] = at_times(record.streams[asked], time)[:, -3:]
     return values
@@ -270,8 +272,18 @@ def _strangeness(m: np.ndarray, usual: np.ndarray) -> int:
 @cache
 def _remedies() -> tuple[Remedy, ...]:
     """All remedies. Each stands for one cause; those that explain more by one convention come first."""
-    orders = {"": np.eye(4), "are xyzw": ORDER, "are world to body": CONJUGATE, "are xyzw, world to body": CONJUGATE @ ORDER}
-    frames = {"": np.eye(4), "are of the body's axes FRD": BODY, "are of a world NED": WORLD, "are of a world NED and a body FRD": WORLD @ BODY}
+    orders = {
+        "": np.eye(4),
+        "are xyzw": ORDER,
+        "are world to body": CONJUGATE,
+        "are xyzw, world to body": CONJUGATE @ ORDER,
+    }
+    frames = {
+        "": np.eye(4),
+        "are of the body's axes FRD": BODY,
+        "are of a world NED": WORLD,
+        "are of a world NED and a body FRD": WORLD @ BODY,
+    }
     found = []
     for (order, first), (frame, then) in product(orders.items(), frames.items()):
         what = f"quaternions {' and '.join(x for x in (order, frame) if x)}"
@@ -284,13 +296,33 @@ def _remedies() -> tuple[Remedy, ...]:
             found += [Remedy(f"{what}, as {name}", q | {name: NED}) for name in world]
     both = {"body_rate": FRD, "specific_force": FRD}
     world = {"position": NED, "velocity": NED, "quaternion": WORLD @ BODY}
-    for some in (world, {k: world[k] for k in ("position", "quaternion")}, {k: world[k] for k in ("velocity", "quaternion")}, {"quaternion": WORLD @ BODY}):
+    for some in (
+        world,
+        {k: world[k] for k in ("position", "quaternion")},
+        {k: world[k] for k in ("velocity", "quaternion")},
+        {"quaternion": WORLD @ BODY},
+    ):
         found.append(Remedy("the world is NED and the body FRD, for all of them", some | both))
     found.append(Remedy("velocities are in the body's axes", turns=True))
     found.append(Remedy("values without gravity", weighs=True))
-    for names in (("body_rate",), ("specific_force",), ("body_rate", "specific_force"), ("position",), ("velocity",), ("position", "velocity")):
+    for names in (
+        ("body_rate",),
+        ("specific_force",),
+        ("body_rate", "specific_force"),
+        ("position",),
+        ("velocity",),
+        ("position", "velocity"),
+    ):
         for m in _signed():
             usual = FRD if names[0] in ("body_rate", "specific_force") else NED
-            axes = "axes and signs are others" if not np.array_equal(m, usual) else "the axes are FRD" if usual is FRD else "the world is NED"
-            found.append(Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m), strange=_strangeness(m, usual)))
+            axes = (
+                "axes and signs are others"
+                if not np.array_equal(m, usual)
+                else "the axes are FRD"
+                if usual is FRD
+                else "the world is NED"
+            )
+            found.append(
+                Remedy(f"{axes} in {' and '.join(names)}", dict.fromkeys(names, m), strange=_strangeness(m, usual))
+            )
     return tuple(found)

@@ -23,7 +23,9 @@ MOVED = 1.0
 """Distance that shows a flight, m."""
 RPM = 30 / np.pi
 SPEEDS = {"rpm": RPM, "revolutions a second": RPM / 60} | {
-    f"{name}, by {pairs} pairs of poles": pairs * RPM / over for name, over in (("eRPM/100", 100), ("eRPM", 1)) for pairs in (7, 6, 8, 11, 12, 14)
+    f"{name}, by {pairs} pairs of poles": pairs * RPM / over
+    for name, over in (("eRPM/100", 100), ("eRPM", 1))
+    for pairs in (7, 6, 8, 11, 12, 14)
 }
 """Other units of rotor speeds: how many of them are one rad/s."""
 
@@ -147,5 +149,3 @@ def _lagged(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     late = np.concatenate([outputs[:1], outputs[:1], outputs[:-2]])
     first = kept * late[:1]
     return np.asarray(lfilter([1 - kept], [1, -kept], late, axis=0, zi=first)[0])
-
-

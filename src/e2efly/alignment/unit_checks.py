@@ -80,8 +80,8 @@ def _check_ratio(record: Record, name: str, ratio: float, to: str) -> None:
     unit = min(known, key=lambda u: abs(np.log(known[u] * ratio)))
     fits = abs(np.log(known[unit] * ratio)) < np.log(UNIT_OFF)
     raise ValueError(
-        f"{record.path}: {name} is {ratio:.3g} times {to}: it looks like {unit if fits else 'another unit'}; accepted: "
-        f"{KINDS[name].unit} ({scaled(name, known[unit] if fits else 1 / ratio)}), or the log --without {name}"
+        f"{record.path}: {name} is {ratio:.3g} times {to}: it looks like {unit if fits else 'another unit'}; "
+        f"accepted: {KINDS[name].unit} ({scaled(name, known[unit] if fits else 1 / ratio)}), or the log --without {name}"
     )
 
 
@@ -105,8 +105,8 @@ def check_force_unit(record: Record) -> None:
     if not 1 / UNIT_OFF < off < UNIT_OFF:
         guess = "values without gravity" if off < 0.04 else "g" if off < 0.2 else "another unit"
         raise ValueError(
-            f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it looks like {guess}; "
-            f"accepted: m/s^2, with gravity ({scaled('specific_force', GRAVITY)}), or a flight --without specific_force"
+            f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it looks like "
+            f"{guess}; accepted: m/s^2, with gravity ({scaled('specific_force', GRAVITY)}), or a flight --without specific_force"
         )
 
 
@@ -145,5 +145,3 @@ def _acceleration(record: Record) -> tuple[np.ndarray, np.ndarray] | None:
     if name == "velocity":
         return 0.5 * (time[1:] + time[:-1]), np.diff(values, axis=0) / CALM_S
     return time[1:-1], np.diff(values, 2, axis=0) / CALM_S**2
-
-
