@@ -59,7 +59,9 @@ def test_what_is_wrong_is_named_or_corrected(tmp_path: Path, record: Record, cor
             continue
         time = right.streams[name].time
         inside = (time > found.streams[name].time[0]) & (time < found.streams[name].time[-1])
-        seen = np.stack([np.interp(time[inside], found.streams[name].time, x) for x in found.streams[name].values.T], -1)
+        seen = np.stack(
+            [np.interp(time[inside], found.streams[name].time, x) for x in found.streams[name].values.T], -1
+        )
         true = right.streams[name].values[inside]
         off = np.minimum(np.abs(seen - true), np.abs(seen + true) if name == "quaternion" else np.inf)
         assert np.quantile(off, 0.8) < 0.1 * max(true.std(), 0.1), name

@@ -20,6 +20,8 @@ from e2efly.vehicles.vehicle import Vehicle
 
 MOVING = 0.3
 """Speed above which the poses show that the vehicle moves, m/s."""
+FEIGNED = 4.0
+"""Ratio of a specific force to what the poses show that wrong frames may lead to."""
 TURNING = 0.1
 """Body rate above which the vehicle turns, rad/s."""
 AT_REST, LEVEL = 0.02, 0.2
@@ -50,12 +52,14 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
         record = without_frozen(record, flight.span if driven else _turning(record))
         check_gyro_unit(record)
         check_motion_units(record)
-        check_force_unit(record)
+        check_force_unit(record, FEIGNED)
         record = with_clock_rate(record)
+        record = on_one_clock(record, record.during(*flight.span))
         record = in_one_frame(record, record.during(*flight.span))
+        check_force_unit(record)
         record = _in_the_air(_levelled(record), vehicle)
         check_rotor_order(record, vehicle)
-        found.append(on_one_clock(check_commanded_thrust(record, vehicle)))
+        found.append(check_commanded_thrust(record, vehicle))
     return found
 
 

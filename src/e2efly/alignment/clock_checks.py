@@ -4,15 +4,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from e2efly.alignment.comparison import GRID, at_times, attitudes, common_times, pearson, rates, smooth, turning
+from e2efly.alignment.comparison import (
+    GRID,
+    at_times,
+    attitudes,
+    common_times,
+    correlations,
+    pearson,
+    rates,
+    smooth,
+    turning,
+)
 from e2efly.alignment.damage_checks import POSES
 from e2efly.alignment.unit_checks import AGREE
 from e2efly.logs.blackbox import vertex
 from e2efly.logs.recording import Record, Stream
 
-DRIFT, UNEVEN = 0.02, 0.05
+DRIFT, UNEVEN = 0.02, 0.04
 """`DRIFT`: constant change of the offset between two clocks during a flight from which on it is corrected, s. `UNEVEN`:
 largest deviation from a constant change, s."""
+CLEAR = 3.0
+"""How many times the deviation from a constant change it has to be itself."""
 FASTEST = 0.02
 """Largest difference of two clocks' rates that is looked for."""
 REACH_S = 0.2
@@ -66,29 +78,31 @@ def with_clock_rate(record: Record) -> Record:
     return _by_clock(record, start, float(candidates[best]), 0.0)
 
 
-def on_one_clock(record: Record) -> Record:
-    """The flight with the poses moved by the offset of their clock, and by its drift, if that is constant.
+def on_one_clock(record: Record, part: Record) -> Record:
+    """The flight with the poses moved by the offset of their clock, and by its drift, if that is constant. Both are
+    found in a part of it: in the air.
 
     Raises:
         ValueError: for clocks that run apart in another way.
     """
     if not record.has("body_rate", "quaternion"):
         return record
-    start, end = record.span
+    start, end = part.span
     length = (end - start) / 3
-    parts = [record.during(a, a + length) for a in np.linspace(start, end - length, PARTS)]
-    lags = [(sum(part.span) / 2, lag) for part in parts if (lag := _behind(part)) is not None]
-    whole = _behind(record)
+    parts = [part.during(a, a + length) for a in np.linspace(start, end - length, PARTS)]
+    lags = [(sum(third.span) / 2, lag) for third in parts if (lag := _behind(third)) is not None]
+    whole = _behind(part)
     if len(lags) > 2:
         at, late = np.array(lags).T
         slope, middle = (float(x) for x in np.polyfit(at - start, late, 1))
-        if np.max(np.abs(late - np.polyval((slope, middle), at - start))) > UNEVEN:
+        uneven = float(np.max(np.abs(late - np.polyval((slope, middle), at - start))))
+        if uneven > UNEVEN:
             raise ValueError(
                 f"{record.path}: the poses are {1e3 * late.min():.0f} to {1e3 * late.max():.0f} ms behind the "
                 "gyroscope, and their clocks do not run apart evenly; accepted: clocks that differ by an offset and a "
                 "rate, or a part of the log (LOG:BEGIN-END)"
             )
-        if abs(slope) * np.ptp(at) > DRIFT:
+        if abs(slope) * (end - start) > max(DRIFT, CLEAR * uneven):
             return _by_clock(record, start, slope, middle)
     if whole is None:  # the age of the poses is then not known either
         return replace(record, pose_age=None)
@@ -119,19 +133,22 @@ def _moved(record: Record, start: float, rate: float, late: float) -> Record:
 
 
 def _behind(record: Record) -> float | None:
-    """Time by which the poses lag behind the gyroscope, s. None if the two show no common motion."""
+    """Time by which the poses lag behind the gyroscope, s. None if the two show no common motion.
+
+    Where their axes do not agree, the amounts of their body rates are compared.
+    """
     if not record.has("body_rate", "quaternion"):
         return None
     told, true = rates(record)
     if len(told) < 100 or np.std(true) < MOVING:
         return None
     reach = round(REACH_S / GRID)
-    scores = []
-    for shift in range(-reach, reach + 1):
-        a = told[max(-shift, 0) : len(told) - max(shift, 0)]
-        b = true[max(shift, 0) : len(true) - max(-shift, 0)]
-        scores.append(np.mean([pearson(a[:, i], b[:, i]) for i in range(3)]))
-    i = int(np.argmax(scores))
-    if scores[i] < AGREE:
-        return None
-    return (i - reach + vertex(np.array(scores), i)) * GRID
+    for a, b in ((told, true), tuple(np.linalg.norm(x, axis=1, keepdims=True) for x in (told, true))):
+        scores = np.array([
+            np.mean(correlations(a[max(-k, 0) : len(a) - max(k, 0)], b[max(k, 0) : len(b) - max(-k, 0)]))
+            for k in range(-reach, reach + 1)
+        ])  # fmt: skip
+        i = int(np.argmax(scores))
+        if scores[i] >= AGREE:
+            return (i - reach + float(vertex(scores, i))) * GRID
+    return None

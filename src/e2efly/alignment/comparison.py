@@ -60,6 +60,11 @@ def smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
 
 def pearson(a: np.ndarray, b: np.ndarray) -> float:
     """Pearson's correlation. 0 if one of the two is constant."""
-    a, b = a - a.mean(), b - b.mean()
-    size = np.sqrt(np.sum(a**2) * np.sum(b**2))
-    return float(np.sum(a * b) / size) if size > 0 else 0.0
+    return float(correlations(a[:, None], b[:, None])[0])
+
+
+def correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Pearson's correlation of each column of one with that of the other, (k,). 0 where one of the two is constant."""
+    a, b = a - a.mean(0), b - b.mean(0)
+    size = np.sqrt(np.sum(a**2, 0) * np.sum(b**2, 0))
+    return np.asarray(np.sum(a * b, 0) / np.where(size > 0, size, np.inf))

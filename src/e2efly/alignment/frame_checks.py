@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from e2efly.alignment.comparison import at_times, attitudes, common_times, pearson, smooth, turning
+from e2efly.alignment.comparison import at_times, attitudes, common_times, correlations, smooth, turning
 from e2efly.control import Quat, Vec3
 from e2efly.logs.recording import KINDS, Record, Stream
 from e2efly.vehicles.gravity import GRAVITY
@@ -138,6 +138,8 @@ def in_one_frame(record: Record, part: Record) -> Record:
     at = max(usual, key=lambda name: usual[name].worst, default="")
     sure = {name for name in usual if name != "steer"}  # a vehicle need not do what it is told
     wrong = any(usual[name].worst > 1 - FIT for name in sure)
+    if not wrong and sum(usual[name].worst for name in sure) < SMALL and usual.get("steer", Misfit(0.0)).worst < 1:
+        return record
     best, least = None, np.inf
     for remedy in _remedies():
         if remedy.needs <= set(values):
@@ -212,9 +214,10 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
     )
 
     def compare(name: str, one: np.ndarray, other: np.ndarray, late: int = 0) -> None:
-        moves = np.maximum(one.std(0), other.std(0)) / ENOUGH[name]
+        moves = one.std(0) if name == "push" else np.maximum(one.std(0), other.std(0))
+        moves = moves / ENOUGH[name]
         for k in range(late + 1):
-            seen = np.array([pearson(a, b) for a, b in zip(one[k:].T, other[: len(other) - k].T, strict=True)])
+            seen = correlations(one[k:], other[: len(other) - k])
             told = seen[(moves > 1) | ((moves > FAINT) & (np.abs(seen) > CLEAR))]
             if len(told) and 1 - told.min() < found.get(name, NEVER).worst:
                 found[name] = Misfit(1 - float(told.min()), len(told))
@@ -233,6 +236,8 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
         felt = _averaged(np.stack([turned.x, turned.y, turned.z], -1)) - np.array([0.0, 0.0, GRAVITY])
         moved = np.gradient(_averaged(position), STEP, axis=0) if velocity is None else _averaged(velocity)
         acceleration = np.gradient(moved, STEP, axis=0)
+        if velocity is None:  # the noise of positions, differentiated twice, hides what averages show
+            felt, acceleration = _averaged(felt), _averaged(acceleration)
         compare("push", felt, acceleration)
         found["weight"] = Misfit(min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0))
     return found

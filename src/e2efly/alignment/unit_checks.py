@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from e2efly.alignment.comparison import at_times, common_times, pearson, rates, smooth
+from e2efly.alignment.comparison import at_times, attitudes, common_times, pearson, rates, smooth
+from e2efly.control import Quat, Vec3
 from e2efly.logs.csv_file import UNIT, UNITS
 from e2efly.logs.recording import KINDS, Record
 from e2efly.vehicles.gravity import GRAVITY
@@ -79,9 +80,10 @@ def _check_ratio(record: Record, name: str, ratio: float, to: str) -> None:
     known = factors(name)
     unit = min(known, key=lambda u: abs(np.log(known[u] * ratio)))
     fits = abs(np.log(known[unit] * ratio)) < np.log(UNIT_OFF)
+    factor, looks = (known[unit], unit) if fits else (1 / ratio, "another unit")
     raise ValueError(
-        f"{record.path}: {name} is {ratio:.3g} times {to}: it looks like {unit if fits else 'another unit'}; "
-        f"accepted: {KINDS[name].unit} ({scaled(name, known[unit] if fits else 1 / ratio)}), or the log --without {name}"
+        f"{record.path}: {name} is {ratio:.3g} times {to}: it looks like {looks}; accepted: {KINDS[name].unit} "
+        f"({scaled(name, factor)}), or the log --without {name}"
     )
 
 
@@ -89,8 +91,12 @@ def _long(record: Record) -> bool:
     return len(common_times(record, "body_rate", "quaternion")) > 200
 
 
-def check_force_unit(record: Record) -> None:
+def check_force_unit(record: Record, most: float = UNIT_OFF) -> None:
     """Compare the specific force with gravity where the vehicle rests or hovers, and with the motion of the poses.
+
+    Args:
+        record: the flight.
+        most: the ratio to these that is refused.
 
     Raises:
         ValueError: saying what it looks like, and what is accepted.
@@ -102,11 +108,13 @@ def check_force_unit(record: Record) -> None:
     told = f"rest, hover or the motion of the poses show {shown[0][1]:.3g}" if shown else f"gravity is {GRAVITY}"
     shown = shown or [(size, float(np.clip(size, GRAVITY, LIVELY * GRAVITY)))]
     off = min((measured / expected for measured, expected in shown), key=lambda x: abs(np.log(max(x, 1e-9))))
-    if not 1 / UNIT_OFF < off < UNIT_OFF:
-        guess = "values without gravity" if off < 0.04 else "g" if off < 0.2 else "another unit"
+    if not 1 / most < off < most:
+        weightless = off < 0.04 or abs(_lift(record)) < 0.3 * off * GRAVITY
+        guess = "values without gravity" if weightless else "g" if off < 0.2 else "another unit"
         raise ValueError(
             f"{record.path}: specific_force has a median size of {size:.3g}, where {told} m/s^2: it looks like "
-            f"{guess}; accepted: m/s^2, with gravity ({scaled('specific_force', GRAVITY)}), or a flight --without specific_force"
+            f"{guess}; accepted: m/s^2, with gravity ({scaled('specific_force', GRAVITY)}), or a flight "
+            "--without specific_force"
         )
 
 
@@ -145,3 +153,16 @@ def _acceleration(record: Record) -> tuple[np.ndarray, np.ndarray] | None:
     if name == "velocity":
         return 0.5 * (time[1:] + time[:-1]), np.diff(values, axis=0) / CALM_S
     return time[1:-1], np.diff(values, 2, axis=0) / CALM_S**2
+
+
+def _lift(record: Record) -> float:
+    """The mean specific force along the world's z, in the log's unit. It is gravity over any flight that ends about as
+    fast as it begins. NaN if the log does not show it.
+    """
+    moved = _acceleration(record) if record.has("quaternion") else None
+    if moved is None or len(moved[0]) < 5:
+        return float("nan")
+    time, acceleration = moved
+    pose, force = record.streams["quaternion"], record.streams["specific_force"]
+    up = np.asarray(Quat(*attitudes(pose, time).T).rotate(Vec3(*at_times(force, time).T)).z)
+    return float(np.mean(up - acceleration[:, 2]))
