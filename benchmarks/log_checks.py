@@ -51,7 +51,7 @@ def main() -> None:
     """Corrupt and check, print what is said, write JSON."""
     options = arguments(__doc__ or "", logs=[""], clean=[""])
     rows, lines, clean = [], [], []
-    for name, record, vehicle in (found for asked in options.logs for found in flights(asked)):
+    for name, record, vehicle in (found for asked in options.logs if asked for found in flights(asked)):
         (right,) = checked([record], vehicle)
         for corruption in CORRUPTIONS:
             if not record.has(*corruption.streams):

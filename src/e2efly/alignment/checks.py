@@ -54,7 +54,11 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
         check_motion_units(record)
         check_force_unit(record, FEIGNED)
         record = with_clock_rate(record)
-        record = on_one_clock(record, record.during(*flight.span))
+        try:
+            record = on_one_clock(record, record.during(*flight.span))
+        except ValueError:  # as wrong frames make it look
+            in_one_frame(record, record.during(*flight.span))
+            raise
         record = in_one_frame(record, record.during(*flight.span))
         check_force_unit(record)
         record = _in_the_air(_levelled(record), vehicle)

@@ -31,6 +31,8 @@ REACH_S = 0.2
 """Largest offset that is looked for, s."""
 MOVING = 0.05
 """Standard deviation of body rates that shows an offset, rad/s."""
+LIVELY = 0.5
+"""Share of the liveliest part's motion from which on a part is used."""
 PARTS = 7
 """Parts of a flight, each a third long, in which the offset is found."""
 COARSE = 0.02
@@ -90,7 +92,13 @@ def on_one_clock(record: Record, part: Record) -> Record:
     start, end = part.span
     length = (end - start) / 3
     parts = [part.during(a, a + length) for a in np.linspace(start, end - length, PARTS)]
-    lags = [(sum(third.span) / 2, lag) for third in parts if (lag := _behind(third)) is not None]
+    motion = np.array([np.std(rates(third)[0]) if third.has("body_rate", "quaternion") else 0.0 for third in parts])
+    lively = motion > LIVELY * np.max(motion)  # where it hardly turns, noise moves the offset
+    lags = [
+        (sum(third.span) / 2, lag)
+        for third, much in zip(parts, lively, strict=True)
+        if much and (lag := _behind(third)) is not None
+    ]
     whole = _behind(part)
     if len(lags) > 2:
         at, late = np.array(lags).T

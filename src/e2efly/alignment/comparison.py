@@ -8,6 +8,10 @@ GRID = 0.005
 """Time between two points at which gyroscope and attitude are compared, s."""
 
 
+EDGE = 9
+"""Points at either end that are left out, where there is nothing to average over."""
+
+
 def common_times(record: Record, *names: str, step: float = GRID) -> np.ndarray:
     """Times at which all of these streams were recorded, (n,) s. Empty if there are none."""
     streams = [record.streams[name] for name in names]
@@ -28,10 +32,11 @@ def attitudes(stream: Stream, time: np.ndarray) -> np.ndarray:
 def rates(record: Record) -> tuple[np.ndarray, np.ndarray]:
     """Body rates from the gyroscope and from the derivative of the attitude, smoothed, on one grid, (n, 3) rad/s."""
     time = common_times(record, "body_rate", "quaternion")
-    if len(time) < 3:
+    if len(time) < 3 * EDGE:
         return np.zeros((0, 3)), np.zeros((0, 3))
     q = smooth(attitudes(record.streams["quaternion"], time))
-    return smooth(at_times(record.streams["body_rate"], time)), turning(q, GRID)
+    inner = slice(EDGE, -EDGE)
+    return smooth(at_times(record.streams["body_rate"], time))[inner], turning(q, GRID)[inner]
 
 
 def turning(q: np.ndarray, step: float) -> np.ndarray:

@@ -145,13 +145,12 @@ def in_one_frame(record: Record, part: Record) -> Record:
         if remedy.needs <= set(values):
             new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
             seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
-            before, after = (sum(misfits[name].worst for name in seen) for misfits in (usual, new))
+            after = sum(new[name].worst for name in seen)
             left = sum(misfit.worst for misfit in new.values()) + SIMPLE * max(after, SMALL) * (
                 len(remedy.needs) + remedy.strange
             )
-            fits = all(new[name].worst <= 1 - FIT and new[name].axes >= usual[name].axes for name in sure)
-            helps = before - after > (SMALL if seen <= sure else 1.0) and after < BETTER * before
-            if left < least and fits and (wrong or helps):
+            fits = all(new[name].worst <= 1 - FIT for name in sure)
+            if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
                 best, least = remedy, left
     if best is None and not wrong:
         return record
@@ -177,6 +176,14 @@ def in_one_frame(record: Record, part: Record) -> Record:
     return replace(_remedied(record, best), notes=(*record.notes, note))
 
 
+def _helps(usual: Mapping[str, Misfit], new: Mapping[str, Misfit], seen: Collection[str], least: float) -> bool:
+    """Whether a remedy leaves little of what two streams disagreed by, and nothing else disagrees more for it."""
+    kept = all(new[name].axes >= usual[name].axes and new[name].worst < usual[name].worst + least for name in seen)
+    return kept and any(
+        usual[name].worst - new[name].worst > least and new[name].worst < BETTER * usual[name].worst for name in seen
+    )
+
+
 def _remedied(record: Record, remedy: Remedy) -> Record:
     streams = dict(record.streams)
     for name, m in remedy.maps.items():
@@ -195,14 +202,24 @@ def _values(record: Record) -> Values:
         return {}
     asked = next((n for n in ("command", "setpoint") if record.has(n)), "")
     time = common_times(record, *names, step=STEP)
+    gaps = [s for n in names for s in _gaps(record.streams[n])]
+    pieces = np.split(time, np.searchsorted(time, sorted(end for _, end in gaps)))
+    time = max(([t for t in piece if not any(a < t < b for a, b in gaps)] for piece in pieces), key=len)
     if len(time) * STEP < LEAST_S:
         return {}
+    time = np.array(time)
     values = {
         n: attitudes(record.streams[n], time) if n == "quaternion" else at_times(record.streams[n], time) for n in names
     }
     if asked:
         values["asked"] = at_times(record.streams[asked], time)[:, -3:]
     return values
+
+
+def _gaps(stream: Stream) -> list[tuple[float, float]]:
+    """Beginning and end of each gap that is longer than what is averaged over, s."""
+    long = np.flatnonzero(np.diff(stream.time) > WIDTH * STEP)
+    return list(zip(stream.time[long], stream.time[long + 1], strict=True))
 
 
 def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[str, Misfit]:
