@@ -18,7 +18,7 @@ LOST = 1e-3
 LEAST_VOLTS = 1.0
 """Lowest plausible voltage of a battery, V. Lower values mean that there is no sensor."""
 POSES = ("position", "velocity", "quaternion")
-FROZEN_S, USUAL_RUNS = 0.25, 5
+FROZEN_S, USUAL_RUNS = 0.2, 5
 """Time for which a stream that repeats its last sample in the air is frozen, s, and by how many times that exceeds how
 long it usually repeats one: poses are often held until the next."""
 

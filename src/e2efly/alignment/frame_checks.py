@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from e2efly.alignment.comparison import at_times, attitudes, common_times, correlations, smooth, turning
+from e2efly.alignment.comparison import at_times, attitudes, common_times, correlations, pearson, smooth, turning
 from e2efly.control import Quat, Vec3
 from e2efly.logs.recording import KINDS, Record, Stream
 from e2efly.vehicles.gravity import GRAVITY
@@ -66,11 +66,18 @@ class Misfit(NamedTuple):
 
     worst: float
     """1 less the correlation of the axis that agrees least."""
-    axes: int = 1
+    axes: int
     """Number of axes that are compared."""
+    whole: float
+    """1 less the correlation of all axes together, each by its motion."""
+
+    @staticmethod
+    def of(number: float) -> "Misfit":
+        """Of a single number."""
+        return Misfit(number, 1, number)
 
 
-NEVER = Misfit(np.inf)
+NEVER = Misfit(np.inf, 0, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,17 +145,19 @@ def in_one_frame(record: Record, part: Record) -> Record:
     at = max(usual, key=lambda name: usual[name].worst, default="")
     sure = {name for name in usual if name != "steer"}  # a vehicle need not do what it is told
     wrong = any(usual[name].worst > 1 - FIT for name in sure)
-    if not wrong and sum(usual[name].worst for name in sure) < SMALL and usual.get("steer", Misfit(0.0)).worst < 1:
+    if (
+        not wrong
+        and sum(usual[name].worst for name in sure) < SMALL
+        and ("steer" not in usual or usual["steer"].worst < 1)
+    ):
         return record
     best, least = None, np.inf
     for remedy in _remedies():
         if remedy.needs <= set(values):
             new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
             seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
-            after = sum(new[name].worst for name in seen)
-            left = sum(misfit.worst for misfit in new.values()) + SIMPLE * max(after, SMALL) * (
-                len(remedy.needs) + remedy.strange
-            )
+            price = SIMPLE * max(sum(new[name].whole for name in seen), SMALL)
+            left = sum(misfit.whole for misfit in new.values()) + price * (len(remedy.needs) + remedy.strange)
             fits = all(new[name].worst <= 1 - FIT for name in sure)
             if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
                 best, least = remedy, left
@@ -217,8 +226,8 @@ def _values(record: Record) -> Values:
 
 
 def _gaps(stream: Stream) -> list[tuple[float, float]]:
-    """Beginning and end of each gap that is longer than what is averaged over, s."""
-    long = np.flatnonzero(np.diff(stream.time) > WIDTH * STEP)
+    """Beginning and end of each gap over which nothing can be averaged, s."""
+    long = np.flatnonzero(np.diff(stream.time) > 0.7 * WIDTH * STEP)
     return list(zip(stream.time[long], stream.time[long + 1], strict=True))
 
 
@@ -237,7 +246,9 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
             seen = correlations(one[k:], other[: len(other) - k])
             told = seen[(moves > 1) | ((moves > FAINT) & (np.abs(seen) > CLEAR))]
             if len(told) and 1 - told.min() < found.get(name, NEVER).worst:
-                found[name] = Misfit(1 - float(told.min()), len(told))
+                a, b = (x - x.mean(0) for x in (one[k:], other[: len(other) - k]))
+                whole = pearson(a.ravel(), b.ravel())
+                found[name] = Misfit(1 - float(told.min()), len(told), 1 - whole)
 
     if "turn" in asked and gyro is not None and q is not None:
         compare("turn", _averaged(gyro), _averaged(turning(q, STEP)))
@@ -247,7 +258,7 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
         compare("slide", _averaged(velocity), np.gradient(_averaged(position), STEP, axis=0))
     if "up" in asked and force is not None:
         size = float(np.median(np.linalg.norm(force, axis=1)))
-        found["up"] = Misfit(1 - float(np.median(force[:, 2])) / max(size, 1e-9))
+        found["up"] = Misfit.of(1 - float(np.median(force[:, 2])) / max(size, 1e-9))
     if "push" in asked and force is not None and q is not None and (velocity is not None or position is not None):
         turned = Quat(*q.T).rotate(Vec3(*force.T))
         felt = _averaged(np.stack([turned.x, turned.y, turned.z], -1)) - np.array([0.0, 0.0, GRAVITY])
@@ -256,7 +267,7 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
         if velocity is None:  # the noise of positions, differentiated twice, hides what averages show
             felt, acceleration = _averaged(felt), _averaged(acceleration)
         compare("push", felt, acceleration)
-        found["weight"] = Misfit(min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0))
+        found["weight"] = Misfit.of(min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0))
     return found
 
 
