@@ -11,7 +11,7 @@ import numpy as np
 from e2efly.alignment.clock_checks import on_one_clock, with_clock_rate
 from e2efly.alignment.comparison import continuous, smooth
 from e2efly.alignment.damage_checks import check_columns, with_battery, within_limits, without_frozen
-from e2efly.alignment.frame_checks import in_one_frame
+from e2efly.alignment.frame_checks import in_one_frame, judged_frames
 from e2efly.alignment.rotor_checks import check_commanded_thrust, check_rotor_order, check_rotor_speed_unit
 from e2efly.alignment.unit_checks import check_force_unit, check_gyro_unit, check_motion_units
 from e2efly.control import Quat
@@ -56,9 +56,9 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
         record = with_clock_rate(record)
         try:
             record = on_one_clock(record, record.during(*flight.span))
-        except ValueError:  # as wrong frames make it look
-            in_one_frame(record, record.during(*flight.span))
-            raise
+        except ValueError:
+            if judged_frames(record.during(*flight.span)).best is None:  # wrong frames make clocks look wrong, too
+                raise
         record = in_one_frame(record, record.during(*flight.span))
         check_force_unit(record)
         record = _in_the_air(_levelled(record), vehicle)

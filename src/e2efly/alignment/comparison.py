@@ -57,8 +57,10 @@ def continuous(q: np.ndarray) -> np.ndarray:
 
 
 def smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
-    """Columns averaged over `width` points by Hann's window, which is zero at its ends."""
+    """Columns averaged over `width` points by Hann's window, which is zero at its ends; fewer stay as they are."""
     kernel = np.hanning(width)[1:-1]
+    if len(x) < len(kernel):
+        return x
     kernel /= kernel.sum()
     return np.stack([np.convolve(column, kernel, "same") for column in x.T], -1)
 

@@ -34,9 +34,9 @@ ANSWER_S = 0.25
 """Within which body rates answer to commands, s."""
 STEP, WIDTH = 0.02, 11
 """Time between the points at which frames are compared, s, and points over which streams are averaged: 0.2 s."""
-SIMPLE = 0.1
-"""Share of the disagreement that stays which each stream that a remedy changes, and its strangeness, has to be worth:
-an axis that hardly moves shows nothing."""
+SIMPLE, CERTAIN = 0.1, 0.02
+"""`SIMPLE`: share of the disagreement that stays which each stream that a remedy changes, and its strangeness, has to
+be worth: an axis that hardly moves shows nothing. `CERTAIN`: the disagreement that is at least reckoned with."""
 RELATIONS = {
     "turn": {"body_rate", "quaternion"},
     "steer": {"body_rate"},
@@ -73,8 +73,8 @@ class Misfit(NamedTuple):
 
     @staticmethod
     def of(number: float) -> "Misfit":
-        """Of a single number."""
-        return Misfit(number, 1, number)
+        """Of a single number, which a sensor's bias changes: it finds no axes."""
+        return Misfit(number, 1, 0.0)
 
 
 NEVER = Misfit(np.inf, 0, np.inf)
@@ -127,6 +127,42 @@ class Remedy:
         return {**values, **changed}
 
 
+class Judgement(NamedTuple):
+    """What the streams of a flight say about its frames."""
+
+    usual: Mapping[str, Misfit]
+    """By relation, as they are."""
+    wrong: bool
+    """Whether two of them do not agree."""
+    best: Remedy | None
+    """What makes all of them agree. None: nothing that is known, or nothing needs to."""
+
+
+def judged_frames(part: Record) -> Judgement:
+    """Compare the streams of a flight as they are, and as each remedy makes them."""
+    values = _values(part)
+    usual = _misfits(values)
+    sure = {name for name in usual if name != "steer"}  # a vehicle need not do what it is told
+    wrong = any(usual[name].worst > 1 - FIT for name in sure)
+    best, least = None, np.inf
+    if (
+        not wrong
+        and sum(usual[name].worst for name in sure) < SMALL
+        and ("steer" not in usual or usual["steer"].worst < 1)
+    ):
+        return Judgement(usual, wrong, best)
+    for remedy in _remedies():
+        if remedy.needs <= set(values):
+            new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
+            seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
+            price = SIMPLE * max(sum(new[name].whole for name in seen), CERTAIN)
+            left = sum(misfit.whole for misfit in new.values()) + price * (len(remedy.needs) + remedy.strange)
+            fits = all(new[name].worst <= 1 - FIT for name in sure)
+            if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
+                best, least = remedy, left
+    return Judgement(usual, wrong, best)
+
+
 def in_one_frame(record: Record, part: Record) -> Record:
     """The flight in our frames: as it is, or corrected where `--columns` cannot do it, which its notes say. `part` is
     what of it is compared: in the air, where no blow from the ground disturbs.
@@ -134,41 +170,23 @@ def in_one_frame(record: Record, part: Record) -> Record:
     Raises:
         ValueError: naming the two streams that do not agree, and what makes them agree.
     """
-    values = _values(part)
-    usual = _misfits(values)
+    usual, wrong, best = judged_frames(part)
     blind = [
         f"{one} cannot be checked against {other}: there is too little motion"
         for name, (one, other, *needed) in TOLD.items()
         if needed and record.has(*needed) and name not in usual
     ]
     record = replace(record, notes=(*record.notes, *blind))
-    at = max(usual, key=lambda name: usual[name].worst, default="")
-    sure = {name for name in usual if name != "steer"}  # a vehicle need not do what it is told
-    wrong = any(usual[name].worst > 1 - FIT for name in sure)
-    if (
-        not wrong
-        and sum(usual[name].worst for name in sure) < SMALL
-        and ("steer" not in usual or usual["steer"].worst < 1)
-    ):
-        return record
-    best, least = None, np.inf
-    for remedy in _remedies():
-        if remedy.needs <= set(values):
-            new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
-            seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
-            price = SIMPLE * max(sum(new[name].whole for name in seen), SMALL)
-            left = sum(misfit.whole for misfit in new.values()) + price * (len(remedy.needs) + remedy.strange)
-            fits = all(new[name].worst <= 1 - FIT for name in sure)
-            if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
-                best, least = remedy, left
     if best is None and not wrong:
         return record
+    at = max(usual, key=lambda name: usual[name].worst)
     one, other, *_ = TOLD[at]
     problem = f"{one} does not agree with {other} (by {1 - usual[at].worst:.2f}, where 1 is the same)"
     if best is None:
+        some = " or ".join(f"--without {name}" for name in sorted(RELATIONS[at] & set(record.streams)))
         raise ValueError(
             f"{record.path}: {problem}, whatever the order of the axes and their signs; accepted: streams of one "
-            f"flight, or the log {' or '.join(f'--without {name}' for name in sorted(RELATIONS[at] & set(values)))}"
+            f"flight, or the log {some}"
         )
     if best.weighs:
         raise ValueError(

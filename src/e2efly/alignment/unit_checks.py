@@ -44,8 +44,8 @@ def check_gyro_unit(record: Record) -> None:
     """
     if not record.has("body_rate", "quaternion"):
         return
-    told, true = (np.linalg.norm(smooth(x, 41), axis=1) for x in rates(record)) if _long(record) else ([], [])
-    if len(told) and np.std(true) > 0.1 and pearson(told, true) > AGREE:
+    told, true = (np.linalg.norm(smooth(x, 41), axis=1) for x in rates(record))
+    if len(told) > 200 and np.std(true) > 0.1 and pearson(told, true) > AGREE:
         _check_ratio(record, "body_rate", float(np.std(told) / np.std(true)), "what the attitude turns by")
 
 
@@ -56,9 +56,9 @@ def check_motion_units(record: Record) -> None:
         ValueError: naming the unit and the option that converts it.
     """
     if record.has("position", "velocity"):
-        time = common_times(record, "position", "velocity", step=CALM_S)
-        if len(time) > 10:
-            moved = np.diff(at_times(record.streams["position"], time), axis=0) / CALM_S
+        time = common_times(record, "position", "velocity", step=CALM_S / 4)
+        if len(time) > 20:
+            moved = np.diff(at_times(record.streams["position"], time), axis=0) / (CALM_S / 4)
             told = at_times(record.streams["velocity"], time)
             there, said = np.linalg.norm(moved, axis=1), np.linalg.norm(told[1:] + told[:-1], axis=1) / 2
             if min(there.std(), said.std()) > 0 and max(there.std(), said.std()) > 0.1 and pearson(there, said) > AGREE:
@@ -85,10 +85,6 @@ def _check_ratio(record: Record, name: str, ratio: float, to: str) -> None:
         f"{record.path}: {name} is {ratio:.3g} times {to}: it looks like {looks}; accepted: {KINDS[name].unit} "
         f"({scaled(name, factor)}), or the log --without {name}"
     )
-
-
-def _long(record: Record) -> bool:
-    return len(common_times(record, "body_rate", "quaternion")) > 200
 
 
 def check_force_unit(record: Record, most: float = UNIT_OFF) -> None:
