@@ -277,11 +277,13 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
     if "up" in asked and force is not None:
         size = float(np.median(np.linalg.norm(force, axis=1)))
         found["up"] = Misfit.of(1 - float(np.median(force[:, 2])) / max(size, 1e-9))
-    if "push" in asked and force is not None and q is not None and (velocity is not None or position is not None):
+    moved = velocity
+    if velocity is None and position is not None:
+        moved = np.gradient(position, STEP, axis=0)
+    if "push" in asked and force is not None and q is not None and moved is not None:
         turned = Quat(*q.T).rotate(Vec3(*force.T))
         felt = _averaged(np.stack([turned.x, turned.y, turned.z], -1)) - np.array([0.0, 0.0, GRAVITY])
-        moved = np.gradient(_averaged(position), STEP, axis=0) if velocity is None else _averaged(velocity)
-        acceleration = np.gradient(moved, STEP, axis=0)
+        acceleration = np.gradient(_averaged(moved), STEP, axis=0)
         if velocity is None:  # the noise of positions, differentiated twice, hides what averages show
             felt, acceleration = _averaged(felt), _averaged(acceleration)
         compare("push", felt, acceleration)
