@@ -10,27 +10,21 @@ that follow other trajectories: with its measured attitude, from its measured po
 the motors' voltage and by drag; then once more with tilt and thrust scale from its first 10 s.
 """
 
-import dataclasses
-from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from common import arguments, table, write
 
 from e2efly.alignment.checks import checked
-from e2efly.alignment.identification import Found, identify
-from e2efly.alignment.model import FACTOR, GYRO, NUISANCES, START, Model, simulate
+from e2efly.alignment.forecast import HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, forecast, typical
+from e2efly.alignment.identification import Found, identify, typical_volts
 from e2efly.alignment.prediction import judged
-from e2efly.alignment.shooting import measured_starts
 from e2efly.alignment.vehicle_file import merged
-from e2efly.alignment.windows import STEP, Windows, cut, join
+from e2efly.alignment.windows import STEP
 from e2efly.logs.csv_file import column_map
 from e2efly.logs.readers import LogReading, read_part
-from e2efly.logs.recording import Record, Stream
+from e2efly.logs.recording import Record
 from e2efly.simulation.device import prepare
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
@@ -45,12 +39,8 @@ CORRUPT = "B2_circle_medium_rep3"
 """Of which splines overshoot; it must be refused."""
 AHEAD = (0.5, 1.0, 2.0)
 """How far ahead positions are foretold, s."""
-SHIFTS = 4
-"""Sets of windows, one shifted by this part of a window against the other."""
-POSE_DELAY, TILT = 6, slice(7, 9)
-"""Places in `NUISANCES` of what belongs to the poses."""
-OWN = 10.0
-"""Seconds of a flight that tell its own tilt and thrust scale."""
+TUNED = ("circle", "figure8", "helix")
+"""The trajectories that were looked at while the prediction was made better."""
 
 
 def crazyflie(folder: Path, vehicle: Vehicle) -> list[dict[str, Any]]:
@@ -94,70 +84,6 @@ def crazyflie(folder: Path, vehicle: Vehicle) -> list[dict[str, Any]]:
     ]
 
 
-def prescribed(record: Record) -> Record:
-    """With the body rates by which its attitudes go over into each other, in the place of the gyroscope's."""
-    pose = record.streams["quaternion"]
-    a, b = pose.values[:-1], pose.values[1:]
-    w = np.sum(a * b, -1)
-    x = a[:, :1] * b[:, 1:] - b[:, :1] * a[:, 1:] - np.cross(a[:, 1:], b[:, 1:])
-    dt = np.diff(pose.time)
-    rates = 2 * x * np.sign(w)[:, None] / dt[:, None]
-    return dataclasses.replace(record, streams={**record.streams, "body_rate": Stream(pose.time[:-1] + dt / 2, rates)})
-
-
-def foretold(record: Record, volts: float | None) -> Windows:
-    """Windows of two seconds, each begun a quarter of that after the one before it."""
-    start, end = record.span
-    length = AHEAD[-1]
-    sets = [
-        cut(record.during(start + length * i / SHIFTS, end), "motor_and_rate", 0, volts, length) for i in range(SHIFTS)
-    ]
-    return join(sets)
-
-
-@partial(jax.jit, static_argnums=())
-def _positions(model: Model, p: Any, q: Any, data: dict[str, Any]) -> Any:
-    start = jnp.zeros(START).at[6:8].set(-q[TILT])
-
-    def one(window: dict[str, Any]) -> Any:
-        return simulate(model, p, q, start, window)["position"]
-
-    return jax.vmap(one)(data)
-
-
-def errors(model: Model, p: np.ndarray, q: np.ndarray, windows: Windows, at: Sequence[float]) -> np.ndarray:
-    """Of the positions, (n, times, 3) m."""
-    steps = [round(t / STEP) - 1 for t in at]  # the poses lie at every other point or so: the nearest before
-    with jax.enable_x64(True):
-        seen = np.asarray(_positions(model, p, q, measured_starts(model, windows)))
-    out = []
-    for step in steps:
-        there = windows.there["position"]
-        near = np.array([max(np.flatnonzero(t[: step + 2])) for t in there])
-        rows = np.arange(len(near))
-        out.append(seen[rows, near] - windows.measured["position"][rows, near])
-    return np.stack(out, 1)
-
-
-def own_nuisances(found: Found, q: np.ndarray, windows: Windows) -> np.ndarray:
-    """With tilt and thrust scale that explain these windows best, by Gauss-Newton; priors are those of the fit."""
-    free = [7, 8, FACTOR]
-    prior = np.array([0.03, 0.03, 0.05])
-    q = q.copy()
-    centre = q[free].copy()
-    for _ in range(4):
-        r = errors(found.model, found.p, q, windows, AHEAD[:2])[:, 1].ravel() / 0.1
-        J = []
-        for i in free:
-            moved = q.copy()
-            moved[i] += 1e-4
-            J.append((errors(found.model, found.p, moved, windows, AHEAD[:2])[:, 1].ravel() / 0.1 - r) / 1e-4)
-        A = np.stack(J, -1)
-        off = q[free] - centre
-        q[free] -= np.linalg.solve(A.T @ A + np.diag(prior**-2.0), A.T @ r + off / prior**2)
-    return q
-
-
 def nanobench(folder: Path, vehicle: Vehicle) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Positions 0.5, 1 and 2 s ahead of every flight, by the fit of those along other trajectories."""
     reading = LogReading(column_map(COLUMNS))
@@ -169,34 +95,30 @@ def nanobench(folder: Path, vehicle: Vehicle) -> tuple[list[dict[str, Any]], lis
             refused = str(error).removeprefix(f"{path.parent}/")
             if path.stem != CORRUPT:
                 raise
-    volts = float(np.median([np.median(r.streams["voltage"].values) for r in records]))
-    fits: dict[str, Found] = {}
+    volts = typical_volts(records)
+    fits: dict[str, tuple[Found, list[float]]] = {}
     rows = []
     for record in records:
-        kind = record.path.stem.split("_")[1]
+        kind = _trajectory(record)
         if kind not in fits:
-            fits[kind] = identify(vehicle, [r for r in records if r.path.stem.split("_")[1] != kind], volts=volts)
-        found = fits[kind]
-        q = found.fit.q.mean(0)
-        q[GYRO], q[POSE_DELAY] = 0.0, 0.0  # the poses alone say where a window starts and how it turns
-        hover = _scaled_to_hover(found)
-        flight = prescribed(record)
-        start, end = flight.span
-        whole, later = foretold(flight, volts), foretold(flight.during(start + OWN, end), volts)
-        own = own_nuisances(found, q, foretold(flight.during(start, start + OWN), volts))
-
-        def told(e: np.ndarray) -> list[float]:
-            return np.linalg.norm(e, axis=-1).mean(0).tolist()
-
-        rows.append({
-            "flight": record.path.stem,
-            "file, scaled to hover": told(errors(found.model, hover, np.zeros(len(NUISANCES)), whole, AHEAD)),
-            "identified": told(errors(found.model, found.p, q, whole, AHEAD)),
-            "with own tilt and scale": told(errors(found.model, found.p, own, later, AHEAD)),
-        })  # fmt: skip
-        print(rows[-1], own[[7, 8, FACTOR]], flush=True)
-    mean = {k: np.mean([r[k] for r in rows], 0).tolist() for k in rows[0] if k != "flight"}
-    rows.append({"flight": "mean", **mean})
+            others = [r for r in records if _trajectory(r) != kind]
+            fits[kind] = identify(vehicle, others, volts=volts), [r.duration for r in others]
+        found, durations = fits[kind]
+        q = typical(found.fit.q, durations, record.duration)
+        seen = forecast(found.model, found.p, q, record, volts, AHEAD)
+        whole, rest = (seen.mean(after)["position"] for after in (0.0, OWN_S))
+        told = {name: whole[name].tolist() for name in (HOLD, HOVER, VEHICLE)} | {
+            OWN_VEHICLE: rest[OWN_VEHICLE].tolist()
+        }
+        rows.append({"flight": record.path.stem, **told})
+        print(rows[-1], seen.own, flush=True)
+    tuned = [row["flight"].split("_")[1] in TUNED for row in rows]
+    parts = {"mean of those tuned on": tuned, "mean of the others": [not x for x in tuned], "mean": [True] * len(rows)}
+    for label, kept in list(parts.items()):
+        some = [row for row, taken in zip(rows, kept, strict=False) if taken]
+        rows.append(
+            {"flight": label} | {k: np.mean([r[k] for r in some], 0).tolist() for k in some[0] if k != "flight"}
+        )
 
     def said(x: Any) -> Any:
         return " / ".join(f"{v:.3f}" for v in x) if isinstance(x, list) else x
@@ -205,14 +127,8 @@ def nanobench(folder: Path, vehicle: Vehicle) -> tuple[list[dict[str, Any]], lis
     return rows, [{k: said(x) for k, x in row.items()} for row in rows]
 
 
-def _scaled_to_hover(found: Found) -> np.ndarray:
-    """The file's vehicle, its thrust such that the mean output of the flights carries it."""
-    mean = np.median(np.diff(found.windows.driven[:, :, :4], axis=1)) / STEP
-    base = found.model.base
-    top = 4 * float(base.rotor_thrust_max) * mean * (0.5 + 0.5 * mean)
-    p = np.zeros(len(found.p))
-    p[[u.name for u in found.model.unknowns].index("thrust")] = np.log(float(base.mass) * 9.80665 / top)
-    return p
+def _trajectory(record: Record) -> str:
+    return record.path.stem.split("_")[1]
 
 
 def main() -> None:

@@ -6,11 +6,15 @@ The paper's figure of the step-response alignment, with the firmware in the plac
 rigid body of the vehicle's file, with a quicker tune than the file says (`tests.validation.steps`),
 `e2efly.alignment.alignment` fits delay and rate loop to the log, and docs/step_response.png shows the mean of four
 steps of each command. `--log` keeps the flight as CSV.
-The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps.
+The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps, and flown by the
+simulator from the same start (docs/closed_loop.png, the paper's figure of the policy's response).
 """
 
+import dataclasses
+import json
 import tempfile
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -21,23 +25,30 @@ from tests.validation.steps import HOLD_S, QUICKER, SetpointStep, fly_steps
 from e2efly.alignment.alignment import LEAD_S, Alignment, align
 from e2efly.alignment.checks import checked
 from e2efly.alignment.replay import SIGNALS, stretches
+from e2efly.alignment.vehicle_file import merged
 from e2efly.commands.align import pose_delay_of
 from e2efly.logs.csv_file import write_csv
+from e2efly.logs.flight_log import read_log
 from e2efly.logs.readers import read_flights
 from e2efly.logs.recording import Record
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.simulation.device import prepare
+from e2efly.tasks.route import usual_route
 from e2efly.validation import firmware_program
+from e2efly.validation.closed_loop import SIGNALS as COMPARED
+from e2efly.validation.closed_loop import closed_loop, policy_of
 from e2efly.validation.rehearsal import LINK_S, rehearse
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.viewing.alignment_plots import AFTER, ASKED, BEFORE, MEASURED, both
+from e2efly.viewing.closed_loop_plot import plot_closed_loop
 from e2efly.viewing.style import figure
 
 PICTURE = Path(__file__).parents[1] / "docs" / "step_response.png"
+LOOP = PICTURE.with_name("closed_loop.png")
 NAMES = ("thrust", "roll rate", "pitch rate", "yaw rate")
 RISEN = 0.632
 """1 - 1/e."""
@@ -67,20 +78,44 @@ def reached(time: np.ndarray, share: np.ndarray, level: float) -> float:
 
 
 def race(name: str) -> dict[str, Any]:
-    """The zoo's race through the firmware, aligned with the bridge's log: most of it at twice hover's thrust."""
-    vehicle = load_vehicle(name)
+    """The zoo's race through the firmware, aligned with the bridge's log: most of it at twice hover's thrust. And the
+    simulator's race by the same policy from the same start, before and after.
+    """
+    vehicle, file = load_vehicle(name), policy_file("race", name)
+    policy = load_policy(file)
+    usual = usual_route(policy.contract)
+    route = dataclasses.replace(usual, outside=True, **usual.whole)
     with tempfile.TemporaryDirectory() as folder:
-        with Telemetry(Path(folder) / "race.mcap", queue_size=200_000) as log:
-            flown = rehearse(firmware_program.chosen(), load_policy(policy_file("race", name)), vehicle, log=log)
-        read = read_flights(Path(folder) / "race.mcap")
-        records = checked(read, vehicle)
+        path = Path(folder) / "race.mcap"
+        with Telemetry(path, queue_size=200_000) as log:
+            flown = rehearse(firmware_program.chosen(), policy, vehicle, log=log, route=route)
+            settings = json.dumps({"policy": str(file), "goal": vars(route)}, default=str)
+            log.record("meta", monotonic(), {"contract": policy.contract.to_json(), "settings": settings})
+        records = checked(read_flights(path), vehicle)
         pose_delay, _, _ = pose_delay_of(None, records)
-    return {"complete": flown.complete, **report(vehicle, align(vehicle, records, pose_delay))}
+        found = align(vehicle, records, pose_delay)
+        aligned = merged(vehicle, {e.name: e for e in found.estimates})
+        told = read_log(path)
+        flew = policy_of(told)
+        assert flew is not None
+        loop = closed_loop(told, records[0], *flew, {"before": vehicle, "aligned": aligned}, pose_delay)
+    plot_closed_loop(LOOP, loop)
+    return {
+        "complete": flown.complete, **report(vehicle, found),
+        "closed_loop": {
+            "compared_s": loop.compared,
+            "rms_difference": {
+                stream: {"unit": unit, **{which: loop.difference(which, stream) for which in loop.simulated}}
+                for stream, unit in COMPARED.items()
+            },
+        },
+    }  # fmt: skip
 
 
 def report(vehicle: Vehicle, found: Alignment) -> dict[str, Any]:
     """What an alignment found."""
     gains = next(e for e in found.estimates if e.name == "rate_gain")
+    told = found.response
     return {
         "pose_delay_s": found.pose_delay,
         "delay_s": dict(zip(("before", "aligned", "sigma"), found.delay, strict=True)),
@@ -88,6 +123,9 @@ def report(vehicle: Vehicle, found: Alignment) -> dict[str, Any]:
             "before": vehicle.rate_gain.tolist(), "aligned": gains.value.tolist(), "sigma": gains.sigma.tolist(),
         },
         "thrust_over_simulated": found.thrust,
+        "motor_lag_s": None if told is None else {
+            "before": vehicle.motor_time_constant, "aligned": told.lag[0], "sigma": told.lag[1], "refused": told.reason,
+        },
         "held_out_rms": {
             name: {"unit": SIGNALS[name], "before": found.before[name], "aligned": found.after[name]}
             for name in found.before

@@ -54,6 +54,7 @@ TITLES = {
     "identify": "Identification of hidden vehicles from the logs of a flight",
     "tune": "From the log of a flight to a policy: hidden vehicles far from their file",
     "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
+    "step_alignment": "Alignment of hidden vehicles by a flight of steps",
     "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
@@ -92,7 +93,7 @@ POLICIES = {
     **dict.fromkeys(
         (
             "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response",
-            "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz", "log_fuzz",
+            "step_alignment", "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz", "log_fuzz",
         ),
         NONE,
     ),
@@ -167,6 +168,11 @@ because real firmware and real logs differ more from the model. [How it is done]
 VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.
 [How it is done, and the picture](identification.md#align).""",
+    "step_alignment": """
+Vehicles as in the tables of the identification, flown for 39 s by `e2efly fly steps`, on seeds that were not
+used for tuning. In MuJoCo, truth is exact. Behind the firmware, it is the rig's own clock for the delay (poses'
+age and time from a command to the setpoint) and the body's motor lag; only the bridge's own log is used.
+[How it is done](identification.md#steps).""",
     "tune": """
 Race with VIS-R's file. The body has up to 25 % more mass, up to 20 % less thrust, inertia up to x1.5,
 motor lag up to x1.6, up to 30 ms more delay and drag up to x2, and at least half of each of these changes.

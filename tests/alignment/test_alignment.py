@@ -39,7 +39,7 @@ def found(record: Record) -> Alignment:
 def test_delay_and_rate_loop_are_found(found: Alignment) -> None:
     """Gains within 5 %, the delay within 2 ms; the vehicle's latency holds the poses' besides."""
     values = {e.name: e.value for e in found.estimates}
-    assert set(values) == {"rate_gain", "latency"}
+    assert set(values) == {"rate_gain", "latency", "motor_time_constant"}
     np.testing.assert_allclose(values["rate_gain"], BODY.rate_gain, rtol=0.05)
     assert abs(float(values["latency"]) - (BODY.latency + POSES)) < 2e-3
     before, after, sigma = found.delay

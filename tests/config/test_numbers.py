@@ -19,13 +19,13 @@ from e2efly.config import ALGORITHMS, CameraConfig, EnvConfig, StageConfig, chec
 from e2efly.config.numbers import Rule, rule_of
 from e2efly.config.reading import read
 from e2efly.config.registry import load
-from e2efly.flight.excitation import ExcitationOptions
+from e2efly.flight.excitation import ExcitationOptions, StepsOptions
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.settings import FlightSettings
 from e2efly.tasks import TASKS
 
 PARTS: tuple[Any, ...] = (
-    *(EnvConfig(), CameraConfig(), FlightSettings(), Checks(), ExcitationOptions(), StageConfig({})),
+    *(EnvConfig(), CameraConfig(), FlightSettings(), Checks(), ExcitationOptions(), StepsOptions(), StageConfig({})),
     *(algorithm() for algorithm in ALGORITHMS.values()),
     *(task() for task in TASKS.values()),
     *(load(task.route)() for task in TASKS.values() if task.route),

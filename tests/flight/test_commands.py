@@ -19,7 +19,7 @@ from e2efly.flight.commander.command import Limits, parse_command, within
 from e2efly.flight.commander.commander import LEASH, Commander, Heading, heading
 from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.commander.stream import STEADY_S, CommandStream, take
-from e2efly.flight.settings import FlightSettings
+from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import MODES, Envelope
 from e2efly.vehicles.gravity import GRAVITY
@@ -321,6 +321,15 @@ def test_check_shows_what_comes_from_a_commander(capsys: pytest.CaptureFixture) 
     assert min(map(int, found.groups())) > 10
 
 
-def test_a_policy_and_a_commander_at_once_are_refused() -> None:
-    with pytest.raises(ValueError, match="--commands is 'udp:9871', and POLICY 'excitation'; accepted: one of them"):
-        fly_command(Fly(policy=Path("excitation"), commands="udp:9871", vehicle="vis_r"))
+@pytest.mark.parametrize("name", ["excitation", "steps"])
+def test_a_policy_and_a_commander_at_once_are_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=f"--commands is 'udp:9871', and POLICY '{name}'; accepted: one of them"):
+        fly_command(Fly(policy=Path(name), commands="udp:9871", vehicle="vis_r"))
+
+
+def test_steps_need_a_vehicle_and_room() -> None:
+    with pytest.raises(ValueError, match="--vehicle is left out"):
+        fly_command(Fly(policy=Path("steps")))
+    small = FlightSettings(fence=Fence(low=(-1.0, -1.0, 0.2), high=(1.0, 1.0, 4.5)))
+    with pytest.raises(ValueError, match=r"in x, which leaves 1\.4 m .* for steps: .* or smaller --steps.rate"):
+        fly_command(Fly(policy=Path("steps"), vehicle="vis_r", flight=small))

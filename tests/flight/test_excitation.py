@@ -1,6 +1,7 @@
 """The excitation flight, which the bridge flies as a policy: inside the fence, whatever the vehicle, and so long."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from e2efly.control.manoeuvres import (
     kicks,
     length_for,
 )  # fmt: skip
-from e2efly.flight.excitation import ExcitationOptions, excitation, room_of
+from e2efly.flight.excitation import ExcitationOptions, InPlace, StepsOptions, excitation
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry
@@ -50,9 +51,9 @@ def far_off(seed: int) -> Vehicle:
     )
 
 
-def flown(body: Vehicle, seconds: float, settings: FlightSettings = SETTINGS) -> tuple[list[Odometry], np.ndarray]:
+def flown(body: Vehicle, options: InPlace, settings: FlightSettings = SETTINGS) -> tuple[list[Odometry], np.ndarray]:
     """Motion and command at every control step, from a hover beside the middle until it is over."""
-    acts, course = excitation(FILE, settings, ExcitationOptions(seconds=seconds))
+    acts, course = excitation(FILE, settings, options)
     runtime = Runtime.of(acts, course, FILE)
     plant: Plant = find_plant("mujoco")(FILE)
     plant.meet(body)
@@ -62,7 +63,7 @@ def flown(body: Vehicle, seconds: float, settings: FlightSettings = SETTINGS) ->
     # the throttle map has learned in the hover before: thrust over mass is nearly what was asked for
     scale = np.array([body.mass * FILE.thrust_map[0] / (FILE.mass * body.thrust_map[0]), 1.0, 1.0, 1.0])
     state, motions, commands = begin(runtime, plant.state.odometry(0.0), 0.0), [], []
-    for k in range(round(seconds / runtime.period) + 10):
+    for k in range(round(acts.schedule.seconds / runtime.period) + 10):
         now, then = k * runtime.period, (k + 1) * runtime.period
         odometry = plant.state.odometry(now)
         state, decision = act(runtime, state, odometry, now)
@@ -81,7 +82,7 @@ def flown(body: Vehicle, seconds: float, settings: FlightSettings = SETTINGS) ->
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_it_stays_inside_the_fence_with_a_vehicle_that_is_not_the_files(seed: int) -> None:
-    motions, commands = flown(far_off(seed), 30.0)
+    motions, commands = flown(far_off(seed), ExcitationOptions(seconds=30.0))
     assert len(motions) == pytest.approx(3000, abs=1)  # and ends by itself
     assert {problem for m in motions if (problem := fence_problem(SETTINGS.fence, m))} == set()
     velocity = np.array([m.velocity for m in motions])
@@ -89,9 +90,34 @@ def test_it_stays_inside_the_fence_with_a_vehicle_that_is_not_the_files(seed: in
     assert np.all(np.ptp(commands[:, 1:], axis=0) > 3.0)
 
 
+@pytest.mark.whole(but=1)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_steps_are_what_was_asked_for_from_a_hover_at_the_place_and_end_by_themselves(seed: int) -> None:
+    """Three pairs of each command, both signs first; nothing else is commanded meanwhile."""
+    options = StepsOptions()
+    motions, commands = flown(far_off(seed), options)
+    assert {problem for m in motions if (problem := fence_problem(SETTINGS.fence, m))} == set()
+    length, rest = round(100 * options.length), round(100 * 0.2)
+    for channel, size in ((0, options.thrust), (1, options.rate), (2, options.rate), (3, options.rate)):
+        others = [i for i in (1, 2, 3) if i != channel]
+        found = []
+        for k in range(1, len(commands) - 2 * length - rest):
+            pair, before = commands[k : k + 2 * length], commands[k - rest + 2 : k]
+            change = pair[:, channel] - before[-1, channel] if len(before) else np.zeros(2 * length)
+            wanted = size * np.repeat([1.0, -1.0], length)
+            bare = len(before) and not np.ptp(before, axis=0).any() and not np.any(commands[k : k + 2 * length, others])
+            if bare and any(np.allclose(change, sign * wanted, atol=1e-5) for sign in (1, -1)):
+                found.append((k, np.sign(change[0])))
+        assert [sign for _, sign in found] == [1.0, -1.0, 1.0]
+        for k, _ in found:
+            assert np.linalg.norm(motions[k].position - np.mean([m.position for m in motions], 0)) < 0.6
+            assert np.linalg.norm(motions[k].velocity) < 0.4
+
+
 def test_a_larger_room_is_flown_faster() -> None:
     wide = dataclasses.replace(SETTINGS, fence=Fence(low=(-12.0, -12.0, 0.2), high=(12.0, 12.0, 6.0), speed=8.0))
-    slow, fast = (np.array([m.velocity for m in flown(FILE, 15.0, settings)[0]]) for settings in (SETTINGS, wide))
+    short = ExcitationOptions(seconds=15.0)
+    slow, fast = (np.array([m.velocity for m in flown(FILE, short, settings)[0]]) for settings in (SETTINGS, wide))
     assert np.abs(fast[:, :2]).max() > 1.5 * np.abs(slow[:, :2]).max()
 
 
@@ -111,13 +137,30 @@ def test_a_fence_without_room_is_refused_by_name(fence: dict[str, object], said:
         excitation(FILE, settings, ExcitationOptions())
 
 
+@pytest.mark.parametrize(
+    ("fence", "options", "said"),
+    [
+        ({"low": (-1.0, -3.0, 0.2), "high": (1.0, 3.0, 4.5)}, {}, r"in x, .* for steps: .* or smaller --steps.rate"),
+        ({"high": (3.0, 3.0, 2.0)}, {}, "in z"),
+        ({"tilt": 0.6}, {}, "flight.fence.tilt is 0.6; accepted for steps: 0.7 rad or more, or smaller --steps.rate"),
+        ({}, {"length": 0.5}, "accepted for steps"),
+        ({}, {"rate": 7.0}, r"steps\.rate is 7"),
+        ({"tilt": 3.0}, {"rate": 4.0, "length": 0.5}, r"steps\.rate times steps\.length is 2; accepted: up to 1 rad"),
+    ],
+)
+def test_steps_without_room_are_refused_by_name(fence: dict[str, object], options: dict[str, Any], said: str) -> None:
+    settings = dataclasses.replace(SETTINGS, fence=dataclasses.replace(Fence(), **fence))
+    with pytest.raises(ValueError, match=said):
+        excitation(FILE, settings, StepsOptions(**options))
+
+
 def test_options_out_of_range_are_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"excitation\.seconds is 5"):
         excitation(FILE, SETTINGS, ExcitationOptions(seconds=5.0))
 
 
 def test_the_speed_is_stopped_from_within_the_room() -> None:
-    room, _ = room_of(SETTINGS)
+    room = excitation(FILE, SETTINGS, ExcitationOptions())[0].room
     still = ManoeuvreRoom(room.low, room.high, 1e9, 0.0)
     assert np.allclose(still.stop(room.low, np.ones(3)), room.low)
     lengths = np.array([2.0, 5.0, 20.0])

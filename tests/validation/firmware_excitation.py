@@ -1,4 +1,6 @@
-"""The excitation flight through the real firmware, on a body that differs from the bridge's vehicle."""
+"""The excitation flight, or one of steps, through the real firmware, on a body that differs from the bridge's
+vehicle.
+"""
 
 import tempfile
 from collections.abc import Sequence
@@ -7,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, InPlace, excitation
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pilot.hover import rates_of
@@ -48,7 +50,7 @@ def fly_excited(
     body: Vehicle,
     settings: FlightSettings,
     *,
-    options: ExcitationOptions | None = None,
+    options: InPlace | None = None,
     log: Log | None = None,
     folder: Path | None = None,
     blackbox: bool = False,
@@ -102,7 +104,7 @@ def fly_excited(
                 done &= session.fly(0.5, session.in_mode(Mode.POLICY))
                 begun, bridge = rig.now(), session.bridge
                 while done and bridge.flight.mode is Mode.POLICY:
-                    rig.thrust_shares = np.full(4, 1 - sag * (rig.now() - begun) / options.seconds)
+                    rig.thrust_shares = np.full(4, 1 - sag * (rig.now() - begun) / acts.schedule.seconds)
                     session.step()
                     if (sent := bridge.sent.command) is not None:
                         commands.append((rig.now(), float(sent.thrust), *rates_of(sent)))

@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from e2efly.alignment.alignment import align
 from e2efly.alignment.checks import checked
 from e2efly.alignment.identification import driver_of
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
+from e2efly.commands.align import pose_delay_of
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, StepsOptions, excitation
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.pilot.flight_state import Mission, Mode, Reason
 from e2efly.flight.settings import Fence
+from e2efly.logs.blackbox import read_blackbox
 from e2efly.logs.blackbox_merge import setpoint_delay, with_blackboxes
 from e2efly.logs.readers import read_flights
 from e2efly.logs.telemetry import Telemetry
@@ -92,3 +95,37 @@ def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
             assert session.land()
         finally:
             session.close()
+
+
+@pytest.mark.whole
+def test_steps_are_flown_and_aligned_by_the_log_of_the_bridge_alone(tmp_path: Path) -> None:
+    """The delay by the rig's clock within 3 ms, the motor lag within its sigma; the blackbox has the loop's terms."""
+    log = tmp_path / "flight.mcap"
+    with Telemetry(log) as telemetry:
+        flight = fly_excited(
+            firmware_program.chosen(),
+            FILE,
+            BODY,
+            SETTINGS,
+            options=StepsOptions(count=2),
+            log=telemetry,
+            folder=tmp_path,
+            blackbox=True,
+        )
+    assert flight.complete
+    assert flight.blackbox is not None
+    (exact,) = with_blackboxes([flight.truth, *read_flights(flight.blackbox)])
+    link, age = setpoint_delay(exact), flight.truth.pose_age
+    assert link is not None
+    assert age is not None
+    records = checked(read_flights(log), FILE)
+    found = align(FILE, records, pose_delay_of(None, records)[0])
+    assert found.measured
+    values = {e.name: e for e in found.estimates}
+    assert float(values["latency"].value) == pytest.approx(link + age, abs=0.003)
+    lag = values["motor_time_constant"]
+    assert abs(float(lag.value) - BODY.motor_time_constant) < 2.5 * float(lag.sigma) < 0.4 * BODY.motor_time_constant
+    assert found.after["roll_rate"] + found.after["pitch_rate"] < found.before["roll_rate"] + found.before["pitch_rate"]
+    (box,) = read_blackbox(flight.blackbox, tuning=True)
+    assert set(box.terms) >= {"P", "I", "D"}
+    assert box.unfiltered is not None

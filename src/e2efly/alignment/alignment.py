@@ -1,5 +1,8 @@
-"""The paper's alignment: find the delay and the rate loop with which the simulator responds to commands as the vehicle
-did.
+"""The paper's alignment: find the delay, the rate loop and the motor lag with which the simulator responds to commands
+as the vehicle did.
+
+The thrust's response to its steps shows the motor lag (`thrust_response`). With this lag, the body rates show delay and
+rate loop. Where the log shows when a command became the setpoint of the rate loop, this time is the delay.
 """
 
 import dataclasses
@@ -11,8 +14,11 @@ import numpy as np
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.identification import Found, Refusal, identify
 from e2efly.alignment.model import Model
-from e2efly.alignment.replay import Stretches, replay, rms, stretches, thrust_is_told, wrong
+from e2efly.alignment.replay import Stretches, asking, replay, rms, stretches, thrust_is_told, wrong
+from e2efly.alignment.thrust_response import FLY as THRUST_STEPS
+from e2efly.alignment.thrust_response import ThrustResponse, lagged, thrust_response
 from e2efly.alignment.windows import REACH, STEP
+from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import Record
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
@@ -55,6 +61,19 @@ class Alignment:
     thrust: float
     """Measured specific force along body z divided by that of the aligned simulator, in the same sections. NaN if not
     known."""
+    response: ThrustResponse | None
+    """The response of the thrust. None: the flights do not show it."""
+    measured: bool
+    """Whether the delay was measured, between the commands and the setpoints of the rate loop."""
+
+    def replayed(self, flown: Stretches, aligned: bool) -> dict[str, np.ndarray]:
+        """The replay of sections, with the vehicle of the file or the aligned one. The aligned one gives as much of the
+        commanded thrust as the real one did. The thrust is as the flight controller's accelerometer shows it.
+        """
+        found, told = self.found, self.response
+        if not aligned:
+            return felt(replay(self.model, np.zeros(len(self.model.names)), flown), told)
+        return felt(replay(found.model, found.p, asking(flown, 1.0 if told is None else told.gain[0])), told)
 
 
 def align(
@@ -76,30 +95,69 @@ def align(
             to fly.
     """
     own = max(float(vehicle.latency) - pose_delay, 0.0)
+    links = [late for late in map(_link, records) if late is not None]
+    link = float(np.mean([late for late, _ in links])) if links else None
+    spread = float(np.max([off for _, off in links])) if links else np.inf
+    response = thrust_response(records, float(vehicle.motor_time_constant), link, spread)
     base = dataclasses.replace(vehicle, latency=own)
-    found = identify(base, records, step=True, told=told)
-    model, late = found.model, next((e for e in found.estimates if e.name == "latency"), None)
-    early = 0.0 if late is None else max(-float(late.value), 0.0)
+    lag = None if response is None or response.reason else response.lag
+    tuned = base if lag is None else dataclasses.replace(base, motor_time_constant=lag[0])
+    if link is not None:
+        tuned = dataclasses.replace(tuned, latency=max(link, 0.0))
+    found = identify(tuned, records, believed=base, step=True, delay=link is None, told=told)
+    late = next((e for e in found.estimates if e.name == "latency"), None)
+    early = max(-(0.0 if link is None else link) if late is None else -float(late.value), 0.0)
     if early > EARLY_S:
         raise ValueError(
             f"{records[0].path}: the body rates answer {1e3 * early:.0f} ms before the commands were sent; accepted: "
             "times of both by one clock"
         )
     if late is not None and early:
-        prompt = dataclasses.replace(base, latency=0.0)
+        prompt = dataclasses.replace(tuned, latency=0.0)
         found = identify(prompt, records, believed=base, step=True, delay=False, told=told)
     if late is None and not found.estimates:
         reasons = "; ".join(refused(refusal) for refusal in found.refusals)
         raise ValueError(f"{', '.join(str(r.path) for r in records)}: nothing can be aligned: {reasons}")
+    source = f"{', '.join(r.path.name for r in records)}; align"
     delay, estimates = (own, np.nan, np.nan), [e for e in found.estimates if e.name != "latency"]
-    if late is not None:
-        value, sigma = max(float(late.value), 0.0), float(np.hypot(late.sigma, early))
+    estimates = [dataclasses.replace(e, source=source) for e in estimates]
+    if late is not None or link is not None:
+        value, sigma = (tuned.latency, spread) if late is None else (float(late.value), float(late.sigma))
+        if late is not None and lag is not None:  # what the lag takes too much, the delay has too little
+            sigma = float(np.hypot(sigma, lag[1]))
+        value, sigma = max(value, 0.0), float(np.hypot(sigma, early))
         delay = own, value, sigma
-        estimates.append(dataclasses.replace(late, value=np.array(value + pose_delay), sigma=np.array(sigma)))
-    estimates = [dataclasses.replace(e, source=e.source.replace("; step", "; align")) for e in estimates]
-    before, _ = _held_out(found, model, records, np.zeros(len(model.names)))
-    after, thrust = _held_out(found, found.model, records, found.p)
-    return Alignment(found, model, delay, early, pose_delay, estimates, found.refusals, before, after, thrust)
+        estimates.append(Estimate("latency", np.array(value + pose_delay), np.array(sigma), source))
+    if lag is not None:
+        estimates.append(Estimate("motor_time_constant", np.array(lag[0]), np.array(lag[1]), source))
+    model = Model.of(base, found.model.driver, base, found.model.names)
+    part = Alignment(
+        found, model, delay, early, pose_delay, estimates, found.refusals, {}, {}, np.nan, response, link is not None
+    )  # fmt: skip
+    before, _ = _held_out(part, records, aligned=False)
+    after, thrust = _held_out(part, records, aligned=True)
+    return dataclasses.replace(part, before=before, after=after, thrust=thrust)
+
+
+def _link(record: Record) -> tuple[float, float] | None:
+    """The time from a command to the setpoint, s, and its standard deviation. None: the log does not show it, as where
+    its commands are only the setpoints.
+    """
+    if not record.has("command") or not np.ptp(record.streams["command"].values[:, 0]):
+        return None
+    late = setpoint_delay(record)
+    # between two samples, every time is equally likely
+    return None if late is None else (late, float(np.hypot(DELAY_SIGMA, 1 / record.streams["setpoint"].rate / 12**0.5)))
+
+
+def felt(seen: dict[str, np.ndarray], response: ThrustResponse | None) -> dict[str, np.ndarray]:
+    """A replay as the accelerometer of the flight controller shows it, with the filter that was found."""
+    if response is None:
+        return seen
+    force = seen["specific_force"].copy()
+    for _ in range(2):
+        force[..., 2] = lagged(force[..., 2], response.filter, STEP)
+    return seen | {"specific_force": force}
 
 
 def refused(refusal: Refusal) -> str:
@@ -111,11 +169,18 @@ def refused(refusal: Refusal) -> str:
     return f"the delay cannot be had (+- {1e3 * refusal.sigma:.0f} ms); fly {FLY.format('body')}"
 
 
-def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarray) -> tuple[dict[str, float], float]:
+def lag_refused(response: ThrustResponse | None) -> str:
+    """The reason why the motor lag was not aligned, and what to fly, in words. Empty: it was, or no log has thrust."""
+    if response is None or not response.reason:
+        return ""
+    return f"the motor lag cannot be had ({response.reason}); fly {THRUST_STEPS}"
+
+
+def _held_out(part: Alignment, records: Sequence[Record], aligned: bool) -> tuple[dict[str, float], float]:
     """By signal, the root mean square error in windows that the fit did not see, with all their streams. And the thrust
-    in these windows, measured divided by simulated.
+    in these windows, measured divided by simulated for the commands as they were sent.
     """
-    windows = found.windows.some(found.held_out)
+    windows = part.found.windows.some(part.found.held_out)
     errors: dict[str, list[np.ndarray]] = {}
     lift, told = 0.0, 0.0
     for number, record in enumerate(records):
@@ -123,18 +188,19 @@ def _held_out(found: Found, model: Model, records: Sequence[Record], p: np.ndarr
         if not len(begin):
             continue
         flown = stretches(record, begin, windows.steps * STEP)
-        seen = replay(model, p, flown)
+        seen = part.replayed(flown, aligned)
         for signal, error in wrong(flown, seen).items():
             errors.setdefault(signal, []).append(error)
         if "specific_force" in flown.measured and thrust_is_told(flown):
             there = flown.there["specific_force"]
             lift += float(flown.measured["specific_force"][..., 2][there].sum())
             told += float(seen["specific_force"][..., 2][there].sum())
-    return {signal: rms(np.concatenate(parts)) for signal, parts in errors.items()}, lift / told if told else np.nan
+    gain = part.response.gain[0] if aligned and part.response is not None else 1.0
+    return {k: rms(np.concatenate(parts)) for k, parts in errors.items()}, gain * lift / told if told else np.nan
 
 
 def clearest(record: Record, channel: int) -> Stretches:
-    """The section around the largest sudden change of a command that follows a calm period.
+    """The section around the largest sudden change of a command from one calm period to another.
 
     The channels are 0: thrust over mass, and 1 to 3: body rate about x, y, z.
     """
@@ -148,6 +214,7 @@ def clearest(record: Record, channel: int) -> Stretches:
 
     before, neutral = held(grid[:, None] + past), 0.0 if channel else GRAVITY
     restless = 2 * np.std(before, axis=1) + 1.5 * np.abs(before[:, -1] - neutral)
+    restless += 2 * np.std(held(grid[:, None] + JUMP_S - past), axis=1)
     start = grid[int(np.argmax(np.abs(held(grid + JUMP_S) - before[:, -1]) - restless))]
     near = sent.during(start, start + JUMP_S + 0.01)
     change = np.abs(np.diff(near.values[:, channel])) if len(near.time) > 1 else np.zeros(0)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found
+from e2efly.alignment.identification import Found, relative_sigma
 from e2efly.alignment.model import Unknown
 from e2efly.vehicles.posterior import ADDED, TOGETHER, Entry
 
@@ -36,15 +36,15 @@ def correlation(
     """
     names: list[str] = []
     blocks: list[np.ndarray] = []
-    for each in found:
-        covariance, sigma = each.fit.covariance, each.sigma
+    for each in (part for whole in found for part in whole.parts):
+        covariance, sigma = each.covariance, relative_sigma(each)
         spread = np.sqrt(np.diag(covariance))
         kept = [
-            i for i, u in enumerate(each.model.unknowns)
+            i for i, u in enumerate(each.unknowns)
             if u.field in fused and entry_of(u).name not in names and _sigma(fused[u.field], entry_of(u)) > 0
         ]  # fmt: skip
         own = (covariance / np.outer(spread, spread) * np.outer(sigma, sigma))[np.ix_(kept, kept)]
-        entries = [entry_of(each.model.unknowns[i]) for i in kept]
+        entries = [entry_of(each.unknowns[i]) for i in kept]
         over = np.array([float(e.field in OVER_MASS) for e in entries]) * mass_sigma
         whole = own + np.outer(over, over)
         by_flight = np.sqrt(np.diag(whole))
@@ -52,7 +52,7 @@ def correlation(
         # the fused variance divided by that of the flights is the flights' fraction of the information
         block = whole / np.outer(by_flight, by_flight) * np.outer(*(np.minimum(share, 1.0),) * 2)
         np.fill_diagonal(block, 1.0)
-        if mass_sigma and not blocks:
+        if mass_sigma and not blocks and kept:
             with_mass = over / by_flight * np.minimum(share, 1.0)
             block = np.block([[block, with_mass[:, None]], [with_mass[None], np.ones((1, 1))]])
             entries.append(Entry(MASS))

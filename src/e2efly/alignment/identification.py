@@ -3,15 +3,29 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.model import NUISANCES, UNKNOWNS, Model, Unknown, vehicle_of
+from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
+from e2efly.alignment.model import (
+    FROM_ZERO,
+    NUISANCES,
+    POSE_DELAY,
+    UNKNOWNS,
+    Model,
+    Unknown,
+    from_zero,
+    value_of,
+    vehicle_of,
+)
+from e2efly.alignment.response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
+from e2efly.alignment.wrench import solved
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import MOTORS, Record
 from e2efly.vehicles.vehicle import Vehicle
@@ -24,22 +38,33 @@ EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of the results between models that differ in properties that no log shows: how often the flight controller
 runs, and how the accelerometer is filtered. In s for the delay, else relative."""
+ROTOR_STRUCTURE = STRUCTURE | {
+    "motor_time_constant_down": 0.015, "rate_gain": 0.02, "rate_integral_gain": 3.0, "gyro_time_constant": 5e-4,
+    "centre_of_mass": 1e-4, "inertia_products": 6e-6, "drag_linear": 0.1, "drag_quadratic": 0.1,
+}  # fmt: skip
+"""The same when rotor speeds were measured. Fields that are added: in their unit. Gusts, and the drag of the rotors
+themselves, count as drag of the body."""
 MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
 """The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so is
 the accelerometer's filter."""
 SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
 """The same when motor outputs are logged so rarely that they are interpolated between samples."""
+STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
-POSE_DELAY = [name for name, _ in NUISANCES].index("pose_delay")
 LEAST = 1.5
 """Minimum flight time that a fit needs, s: half a lap of a race shows all parameters. What a flight does not show is
 refused by its standard deviation."""
 TORQUES = 200.0
-"""Sampling rate of motor outputs from which on they show the torques on the body, Hz."""
+"""Sampling rate of motor outputs and rotor speeds from which on they show the torques on the body, Hz."""
+SURE = 3.0
+"""Number of standard deviations from which on an effect that the vehicle file does not have counts as shown."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
-values of the file; beyond it, the fit is repeated. `REFITS`: the largest number of such repetitions."""
+values of the file; beyond it, the fit is repeated. Those standard deviations hold for known refused ones. `REFITS`: the
+largest number of such repetitions."""
+ABOVE_ZERO = 2.0
+"""Standard deviations by which an unknown that the file has as zero must be above it to be taken from the flights."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +76,37 @@ class Refusal:
     """Standard deviation after the fit, s or relative."""
     impossible: bool = False
     """Whether the fitted value is impossible for a rigid body."""
+    added: float = 0.0
+    """If the file has zero, the unit of `sigma`, in the unit of the file's field."""
 
     def __str__(self) -> str:
         if self.impossible:
             return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
+        if self.added:
+            off = f"{self.sigma * self.added:.2g} {Vehicle.__dataclass_fields__[self.unknown.field].metadata['unit']}"
+            return (
+                f"{self.unknown.name} stays 0, as in the file: the flights show it to +- {off}; fly: {self.unknown.fly}"
+            )
         unit = " s" if self.unknown.field == "latency" else ""
         how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
         return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Unknowns that were fitted together."""
+
+    base: Vehicle
+    """The vehicle at which all of them are zero."""
+    unknowns: tuple[Unknown, ...]
+    p: np.ndarray
+    """(u,) their values."""
+    sigma: np.ndarray
+    """(u,) their standard deviations."""
+    covariance: np.ndarray
+    """(u, u) whose correlations hold."""
+    noise: dict[str, float]
+    """Spread of each sensor about the model."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +127,21 @@ class Found:
     """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
     structures: dict[str, np.ndarray]
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
+    response: Part | None = None
+    """What the rotor speeds show of lag, delay and rate loop, if they were measured."""
+    misfits: tuple[Misfit, ...] = ()
+    """What the fit leaves over, by sensor."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """What was fitted, each part by itself."""
+        own = Part(self.model.base, self.model.unknowns, self.p, self.sigma, self.fit.covariance, self.fit.noise)
+        return (own,) if self.response is None else (own, self.response)
+
+
+def relative_sigma(part: Part) -> np.ndarray:
+    """Standard deviations of the unknowns, (u,), relative to the value where the file has zero, as elsewhere."""
+    return np.where(from_zero(part.base, part.unknowns) > 0, part.sigma / np.maximum(part.p, 1e-12), part.sigma)
 
 
 def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
@@ -93,7 +157,9 @@ def driver_of(records: Sequence[Record], step: bool = False) -> str:
         ValueError: naming the flight that has no such stream.
     """
     wanted = ("command",) if step else ("command", "rotor_speed", "motor")
-    if not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
+    if not step and all(r.has("rotor_speed") and r.streams["rotor_speed"].rate >= TORQUES for r in records):
+        wanted = ("rotor_speed",)
+    elif not step and all(_shows_motors(record) and not _drives(record, "rotor_speed") for record in records):
         wanted = ("motor",)
     for name in wanted:
         if all(_drives(record, name, step) for record in records):
@@ -122,7 +188,7 @@ def _shows_motors(record: Record) -> bool:
     return record.has("motor") and record.streams["motor"].rate >= MOTORS
 
 
-def _volts(records: Sequence[Record]) -> float | None:
+def typical_volts(records: Sequence[Record]) -> float | None:
     """The typical battery voltage of these flights, V. None if one of them has no voltage."""
     if not all(record.has("voltage") for record in records):
         return None
@@ -137,6 +203,7 @@ def identify(
     step: bool = False,
     delay: bool = True,
     volts: float | None = None,
+    plain: bool = False,
     told: Callable[[int, float], None] = lambda i, cost: None,
 ) -> Found:
     """Identify a vehicle from flights.
@@ -148,13 +215,14 @@ def identify(
         step: find only the delay and the rate loop, which steps of body rate show.
         delay: with `step`, also find the delay.
         volts: battery voltage for which the thrust is given, V. If omitted, the typical voltage of these flights.
+        plain: from rotor speeds, look for nothing that the vehicle's file does not have.
         told: called with (iteration, cost) after each iteration of the fit.
 
     Raises:
         ValueError: naming the flight and what it lacks.
     """
     driver = driver_of(records, step)
-    volts = _volts(records) if volts is None else volts
+    volts = typical_volts(records) if volts is None else volts
     parts, length = [], LENGTHS.get(driver, LENGTH)
     for number, record in enumerate(records):
         if not record.has("body_rate"):
@@ -181,34 +249,91 @@ def identify(
     every = min(HELD_OUT, windows.count)
     held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
-    found = fit(model, seen, begin(model, seen), told=told)
-    sigma = sigmas(model, found)
+    absent = np.array([plain and unknown.absent(vehicle) for unknown in model.unknowns])
+    if driver == "rotor_speed":
+        found = solved(model, seen, records, absent)
+    else:
+        found = fit(model, seen, begin(model, seen), told=told)
+    sigma = sigmas(model, found, misfits(found, seen, records))
     impossible = _impossible(model, found.p)
-    refused = impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
-    p = _given(found.p, whole_covariance(found, sigma), refused)
+    refused = absent | impossible | _taken_back(model, found.p, sigma)
+    p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
-        if not refused.any() or np.all(np.abs(p - found.p)[~refused] < NEAR * sigma[~refused]):
+        unclear = np.any(_is_vague(model.base, model.unknowns, found.p, sigma) & ~refused)
+        near = np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused])
+        if not refused.any() or (near and not unclear):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
-        found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
-        sigma = np.where(refused, sigma, sigmas(model, found))
+        if driver == "rotor_speed":
+            found = solved(model, seen, records, refused)
+        else:
+            found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
+        sigma = np.where(refused, sigma, sigmas(model, found, misfits(found, seen, records)))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
-        more = refused | impossible | [_is_vague(u, off) for u, off in zip(model.unknowns, sigma, strict=True)]
+        more = refused | impossible | _is_vague(model.base, model.unknowns, p, sigma)
         if np.all(more == refused):
             break
-        refused, p = more, _given(found.p, whole_covariance(found, sigma), more)
+        refused = more
+        p, known = _given(found.p, whole_covariance(found, sigma), refused)
     structures = _structures(model, seen, p, refused)
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
-    refusals = [Refusal(model.unknowns[i], float(sigma[i]), bool(impossible[i])) for i in np.flatnonzero(refused)]
+    refusals = _refusals(model.base, model.unknowns, sigma, refused & ~absent, impossible)
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
-    estimates = _estimates(model, p, sigma, refused, source)
+    estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
+    left, answer = misfits(found, seen, records), None
+    late = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
+    answered = None if late is None else (float(model.base.latency) + float(p[late]), float(sigma[late]))
+    if driver == "rotor_speed":
+        estimates += _yaw(model, found, sigma, impossible, source)
+    if driver == "rotor_speed" and all(_drives(record, "command") for record in records):
+        answer, more = _answer(model, records, plain)
+        left += more
+        held = np.array([plain and unknown.absent(vehicle) for unknown in RESPONSE])
+        vague = _is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held
+        refusals += _refusals(model.base, RESPONSE, answer.sigma, vague)
+        estimates += _estimates(model.base, RESPONSE, answer.p, answer.sigma, vague | held, source)
+        answered = next(((float(e.value), float(e.sigma)) for e in estimates if e.name == "latency"), None)
     if not step:  # with `step`, the fitted delay from command to response is the result
         estimates = [e for e in estimates if e.name != "latency"]
-        estimates += _latency(model, records, found, p, sigma, refused, source)
-    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures)
+        by_commands = answered if driver in ("command", "rotor_speed") else None
+        estimates += _latency(records, found.q, by_commands, driver == "motor_and_rate", source)
+    return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, answer, tuple(left))
+
+
+def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[Part, list[Misfit]]:
+    """What the rotor speeds show of lag, delay and rate loop, and what is left over."""
+    found, left = responded(model, records, plain)
+    off = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
+    off = np.hypot(off, [ROTOR_STRUCTURE.get(u.field, 0.0) for u in RESPONSE])
+    sigma = widened(left, off, np.array([u.prior for u in RESPONSE]))
+    return Part(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
+
+
+def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, source: str) -> list[Estimate]:
+    """Rotor speeds show the inertia about z over the torque ratio. It counts as inertia, with the file's torque ratio,
+    unless no rigid body has that inertia: then the moment changes as the two others do, and the rest is the ratio's.
+    """
+    at = {u.name: i for i, u in enumerate(model.unknowns)}
+    z = at["inertia_z"]
+    if not impossible[z]:
+        return []
+    others = float(np.log(np.mean(np.exp(found.p[[at["inertia_x"], at["inertia_y"]]]))))
+    ratio = float(model.base.torque_ratio) * float(np.exp(others - found.p[z]))
+    return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * sigma[z]), source)]
+
+
+def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[Misfit]:
+    """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others."""
+    left = []
+    for name in found.squares:
+        if name not in ("quaternion", "position"):
+            moved = motion(windows.measured[name], windows.there[name])
+            white = np.mean([white_noise(r.streams[name].values) for r in records if r.has(name)])
+            left.append(misfit(name, found.squares[name], moved, float(white)))
+    return left
 
 
 def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
@@ -233,46 +358,53 @@ def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarr
 
 
 def _latency(
-    model: Model,
-    records: Sequence[Record],
-    found: Fit,
-    p: np.ndarray,
-    sigma: np.ndarray,
-    refused: np.ndarray,
-    source: str,
+    records: Sequence[Record], q: np.ndarray, answered: tuple[float, float] | None, seldom: bool, source: str
 ) -> list[Estimate]:
     """The latency from the vehicle's motion to its rate loop. It is the delay from a command to the rate loop plus, if
     the log contains it, the age of the poses from which the command was computed.
 
-    The first delay is found from the setpoints, if the flight controller logs them, else by the fit of commands. A
-    delay of motor outputs is not a property of the vehicle. With rarely logged data of a flight controller, the delay
-    between that data and the poses says nothing about the age of the poses, because the data itself is late, by up to
-    the time between two samples.
+    The first delay is found from the setpoints, if the flight controller logs them, else it is what the fit of commands
+    has `answered`: the delay and its standard deviation, s. A delay of motor outputs is not a property of the vehicle.
+    With data of a flight controller that is logged `seldom`, the delay between that data and the poses says nothing
+    about the age of the poses, because the data itself is late, by up to the time between two samples.
     """
     shown = [late for late in map(setpoint_delay, records) if late is not None]
-    at = [i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]]
     if shown:
         late, off = float(np.mean(shown)), DELAY_SIGMA
-    elif at and model.driver == "command":
-        late, off = float(model.base.latency) + float(p[at[0]]), float(sigma[at[0]])
+    elif answered is not None:
+        late, off = answered
     else:
         return []
-    seldom = model.driver == "motor_and_rate"
     if seldom:  # every time within an interval is equally likely
         off = float(np.hypot(off, np.median([np.median(np.diff(r.streams["motor"].time)) for r in records]) / 12**0.5))
     ages = [
-        record.pose_age + (0.0 if seldom else float(q[POSE_DELAY]))
-        for record, q in zip(records, found.q, strict=True)
+        record.pose_age + (0.0 if seldom else float(own[POSE_DELAY]))
+        for record, own in zip(records, q, strict=True)
         if record.pose_age is not None
     ]
     total = max(late + (float(np.mean(ages)) if ages else 0.0), 0.0)
     return [Estimate("latency", np.array(total), np.array(off), source)]
 
 
-def _is_vague(unknown: Unknown, sigma: float) -> bool:
-    """Whether the flights say too little about an unknown."""
-    limit = next((v for name, v in EXACT.items() if unknown.field.startswith(name)), EXACT_ELSE)
-    return bool(sigma > min(limit, SHOWN * unknown.prior))
+def _refusals(
+    base: Vehicle, unknowns: Sequence[Unknown], sigma: np.ndarray, refused: np.ndarray, impossible: Any = False
+) -> list[Refusal]:
+    """The refusals of those unknowns that are refused, (u,)."""
+    units, impossible = from_zero(base, unknowns), np.broadcast_to(impossible, refused.shape)
+    return [
+        Refusal(unknowns[i], float(sigma[i]), bool(impossible[i]), float(units[i]))
+        for i in map(int, np.flatnonzero(refused))
+        if unknowns[i].field
+    ]
+
+
+def _is_vague(base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """About which unknowns, (u,), the flights say too little."""
+    limits = []
+    for u in unknowns:
+        exact = next((v for name, v in EXACT.items() if u.field.startswith(name)), np.inf if u.added else EXACT_ELSE)
+        limits.append(min(exact, SHOWN * u.prior))
+    return (sigma > limits) | ((from_zero(base, unknowns) > 0) & (p < ABOVE_ZERO * sigma))
 
 
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
@@ -281,49 +413,75 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
     If the model explains a torque by something else, such as the rotors' own inertia, a moment has no bound in the fit.
     """
-    moments = np.asarray(vehicle_of(model, jnp.asarray(p)).inertia, float)
+    moments = np.asarray(vehicle_of(model.base, model.unknowns, jnp.asarray(p)).inertia, float)
     largest = int(np.argmax(moments))
     at = np.array([u.field == "inertia" and u.entries == (largest,) for u in model.unknowns])
     return at & (2 * moments[largest] > moments.sum())
 
 
-def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> np.ndarray:
-    """The unknowns, given that the refused ones are zero (the values of the file). This is the mean of the normal
-    distribution under that condition. The others then no longer compensate for the fitted values of the refused ones.
+def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only the
+    one is refused that the file has as zero, or the less certain of two zeros.
     """
-    if not refused.any() or refused.all():
-        return np.where(refused, 0.0, p)
-    kept = ~refused
-    moved = covariance[np.ix_(kept, refused)] @ np.linalg.solve(covariance[np.ix_(refused, refused)], -p[refused])
-    out = np.zeros_like(p)
-    out[kept] = p[kept] + moved
-    return out
+    vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
+    for axis in range(3):
+        both = [i for i, u in enumerate(model.unknowns) if u.field in FROM_ZERO and u.entries == (axis,)]
+        if len(both) == 2 and vague[both].all() and zero[both].any():
+            vague[max(both, key=lambda i: (not zero[i], float(p[i] / sigma[i])))] = False
+    return vague
 
 
-def sigmas(model: Model, found: Fit) -> np.ndarray:
-    """Standard deviations of the unknowns. Each is the larger of two values, the spread between windows and the effect
-    of white noise, combined as a root sum of squares with the uncertainty of the model itself (`STRUCTURE`).
+def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unknowns, (u,), given that the refused ones are zero (the values of the file), and their standard deviations.
+    These are those of the normal distribution under that condition. The others then no longer compensate for the
+    fitted values of the refused ones.
     """
-    noise = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
-    structure = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE}.get(model.driver, STRUCTURE)
-    return np.hypot(noise, [structure.get(u.field, 0.0) for u in model.unknowns])
+    out, sigma = np.where(refused, 0.0, p), np.where(refused, 0.0, np.sqrt(np.diag(covariance)))
+    if refused.any() and not refused.all():
+        kept = ~refused
+        slope = np.linalg.solve(covariance[np.ix_(refused, refused)], covariance[np.ix_(refused, kept)])
+        out[kept] -= p[refused] @ slope
+        left = np.diag(covariance)[kept] - np.sum(covariance[np.ix_(refused, kept)] * slope, 0)
+        sigma[kept] = np.sqrt(np.maximum(left, 0.0))
+    return out, sigma
 
 
-def _estimates(model: Model, p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str) -> list[Estimate]:
-    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file."""
+def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
+    """Standard deviations of the unknowns. Each is the largest of three values, the spread between windows, the spread
+    between flights and the effect of white noise, combined as a root sum of squares with the uncertainty of the model
+    itself (`STRUCTURES`). What is left over widens them.
+    """
+    noise = np.maximum(np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed))), found.between)
+    structure, size = STRUCTURES.get(model.driver, STRUCTURE), np.abs(found.p)
+    scale = np.where(from_zero(model.base, model.unknowns) > 0, size, 1.0)  # relative, of what is no logarithm too
+    off = np.hypot(noise, scale * [structure.get(u.field, 0.0) for u in model.unknowns])
+    return widened(left, off, np.array([u.prior for u in model.unknowns]))
+
+
+def _estimates(
+    base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str
+) -> list[Estimate]:
+    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file, and so are
+    effects that it does not have and that are not shown.
+    """
     values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for unknown, x, off, vague in zip(model.unknowns, p, sigma, refused, strict=True):
-        if vague or not unknown.field:
+    shown = [u.field for u, x, off in zip(unknowns, p, sigma, strict=True) if abs(x) > SURE * off]
+    for unknown, x, off, vague, unit in zip(unknowns, p, sigma, refused, from_zero(base, unknowns), strict=True):
+        absent = unknown.field and getattr(base, unknown.field) is None
+        if vague or not unknown.field or (absent and unknown.added and unknown.field not in shown):
             continue
-        base = np.asarray(getattr(model.base, unknown.field), float)
-        value, spread = values.setdefault(unknown.field, (np.full(base.shape, np.nan), np.full(base.shape, np.nan)))
+        own = np.asarray(value_of(base, unknown.field), float)
+        lacking = own if absent else np.full(own.shape, np.nan)
+        value, spread = values.setdefault(unknown.field, (lacking.copy(), np.full(own.shape, np.nan)))
         at = list(unknown.entries) if unknown.entries else ...
-        if unknown.field == "latency":
-            value[at], spread[at] = base + x, off
+        if unknown.added:
+            value[at], spread[at] = own[at] + x, off
+        elif unit:
+            value[at], spread[at] = unit * x, unit * off
         else:
-            value[at], spread[at] = base[at] * np.exp(x), np.abs(base[at]) * np.exp(x) * off
+            value[at], spread[at] = own[at] * np.exp(x), np.abs(own[at]) * np.exp(x) * off
         if unknown.field == "thrust_map":  # the largest thrust grows with the map
-            top = float(model.base.rotor_thrust_max) * np.exp(x)
+            top = float(base.rotor_thrust_max) * np.exp(x)
             values["rotor_thrust_max"] = np.array(top), np.array(top * off)
     return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()]
 

@@ -1,6 +1,7 @@
 """The model of the fit: the unknown parameters of a vehicle, and the simulation of a window of a flight with them."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, State, split4
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,17 @@ class Unknown:
     entries: tuple[int, ...]
     """Entries of the field that it changes together. Empty: all entries."""
     prior: float
-    """Prior standard deviation, before any flight: of the logarithm, or for a delay in s."""
+    """Prior standard deviation, before any flight: of the logarithm, or in the field's unit if it is added."""
     drivers: tuple[str, ...]
     """The drivers (`Model.driver`) with which a flight can show it."""
     fly: str
     """What to fly and to log if it cannot be found."""
+    added: bool = False
+    """Whether it is added to the value of the file, in place of the logarithm of a factor on it."""
+
+    def absent(self, base: Vehicle) -> bool:
+        """Whether it is an effect that the vehicle file does not have."""
+        return self.field != "" and getattr(base, self.field) is None
 
 
 _TURNS = ("command", "motor", "rotor_speed")
@@ -48,7 +55,7 @@ _YAW = "steps of yaw rate, with rotor speeds or motor outputs in the log"
 _STEPS = "steps of thrust and body rate, logged at 200 Hz or more, with the times at which commands were sent"
 UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("thrust", "thrust_map", (), 0.5, _ALL, _CLIMB),
-    Unknown("torque_ratio", "torque_ratio", (), 0.5, _TURNS, _YAW),
+    Unknown("torque_ratio", "torque_ratio", (), 0.5, ("command", "motor"), _YAW),
     Unknown("inertia_x", "inertia", (0,), 0.5, _TURNS, _RATES),
     Unknown("inertia_y", "inertia", (1,), 0.5, _TURNS, _RATES),
     Unknown("inertia_z", "inertia", (2,), 0.5, _TURNS, _RATES),
@@ -65,16 +72,25 @@ UNKNOWNS: tuple[Unknown, ...] = (
     Unknown("motor_curve", "", (), 0.3, _MOTORS, _CLIMB),
     Unknown("motor_idle", "", (), 0.15, _MOTORS, _CLIMB),
     Unknown("rotor_inertia", "", (), 0.3, ("motor",), _YAW),
-    Unknown("latency", "latency", (), 0.05, ("command", *_MOTORS), _STEPS),
+    Unknown("latency", "latency", (), 0.05, ("command", *_MOTORS), _STEPS, added=True),
+    Unknown("centre_of_mass_x", "centre_of_mass", (0,), 0.005, ("rotor_speed",), _RATES, added=True),
+    Unknown("centre_of_mass_y", "centre_of_mass", (1,), 0.005, ("rotor_speed",), _RATES, added=True),
+    Unknown("inertia_xy", "inertia_products", (0,), 1e-4, ("rotor_speed",), _RATES, added=True),
+    Unknown("inertia_xz", "inertia_products", (1,), 1e-4, ("rotor_speed",), _RATES, added=True),
+    Unknown("inertia_yz", "inertia_products", (2,), 1e-4, ("rotor_speed",), _RATES, added=True),
 )  # fmt: skip
 """Unknowns of the vehicle. Most are the logarithm of a factor on the value of the vehicle file. These are added
 instead: the delay, s; the curve of the motors (the part of the thrust that rises with the square of the output); the
 fraction of the largest thrust at zero output; and the rotors' inertia. The inertia is given by the yaw rate, rad/s,
 that the vehicle gains when all rotors of one spin direction gain the speed of hover, divided by ten."""
+FROM_ZERO = {"drag_linear": 0.3, "drag_quadratic": 0.1}
+"""Where the vehicle file has no drag (zero), the unknown is not a factor on it but the drag itself, never negative, in
+this unit times the mass, 1/s and 1/m."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
-    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("force_filter", 0.7),
+    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("force_filter", 0.7), ("wind_x", 1.5),
+    ("wind_y", 1.5),
 )  # fmt: skip
 """Nuisance parameters of each flight, with the standard deviation of their priors, in this order: biases of gyroscope
 (rad/s) and accelerometer (m/s^2); delay of the pose source (s); tilt of the pose source's body axes (rad); fraction of
@@ -82,8 +98,12 @@ the thrust that is lost by the end of the flight; logarithm of a factor on the t
 several flights; fraction by which the rotors on the left, at the rear, and with positive spin pull more than the others
 (worn propellers, or a centre of mass that is not in the middle); logarithm of the accelerometer filter's time constant
 divided by `FORCE_FILTER`."""
-GYRO, FORCE, LOST, FACTOR, UNEVEN, FILTERED = slice(0, 3), slice(3, 6), 9, 10, slice(11, 14), 14
-"""Indices in `NUISANCES`: of the biases, of the changes of the thrust, and of the accelerometer's filter."""
+UNITS = {"gyro": "rad/s", "force": "m/s^2", "pose": "s", "tilt": "rad", "wind": "m/s"}
+"""Units of the nuisances by the first word of their names. All others have the unit 1."""
+GYRO, FORCE, POSE_DELAY, TILT, LOST, FACTOR = slice(0, 3), slice(3, 6), 6, slice(7, 9), 9, 10
+UNEVEN, FILTERED, WIND = slice(11, 14), 14, slice(15, 17)
+"""Indices in `NUISANCES`: of the biases, of the poses' delay and tilt, of the changes of the thrust, of the
+accelerometer's filter, and of the wind."""
 FORCE_FILTER = 0.011
 """Time constant of each of the two stages with which a flight controller filters its accelerometer, s. Together they
 have the same delay as Betaflight's own 10 Hz filter. Without this filter, a fit would find a thrust that rises less
@@ -137,29 +157,57 @@ def _shows(unknown: Unknown, base: Vehicle, driver: str) -> bool:
     """Whether flights with this driver can show an unknown. A factor on a value of zero has no effect."""
     if driver not in unknown.drivers:
         return False
-    return unknown.field in ("", "latency") or bool(np.any(_entries(base, unknown) != 0))
+    return unknown.added or unknown.field in ("", *FROM_ZERO) or not _is_zero(base, unknown)
 
 
-def _entries(vehicle: Vehicle, unknown: Unknown) -> np.ndarray:
-    value = np.asarray(getattr(vehicle, unknown.field))
-    return value[list(unknown.entries)] if unknown.entries else value
+def from_zero(base: Vehicle, unknowns: Sequence[Unknown]) -> np.ndarray:
+    """The unit of each unknown that is a drag which the file has as zero, (u,), in the unit of its field. Else 0."""
+    units = [FROM_ZERO.get(u.field, 0.0) * float(base.mass) for u in unknowns]
+    return np.where([u.field in FROM_ZERO and _is_zero(base, u) for u in unknowns], units, 0.0)
 
 
-def vehicle_of(model: Model, p: Array) -> Vehicle:
+def _is_zero(base: Vehicle, unknown: Unknown) -> bool:
+    value = np.asarray(value_of(base, unknown.field))
+    return not np.any(value[list(unknown.entries)] if unknown.entries else value)
+
+
+def vehicle_of(base: Vehicle, unknowns: Sequence[Unknown], p: Array) -> Vehicle:
     """The vehicle for these values of its unknowns, (u,)."""
     changed: dict[str, Any] = {}
-    for unknown, x in zip(model.unknowns, p, strict=True):
+    for unknown, x in zip(unknowns, p, strict=True):
         if not unknown.field:
             continue
-        value = jnp.asarray(changed.get(unknown.field, getattr(model.base, unknown.field)))
-        if unknown.field == "latency":
-            changed["latency"] = value + x
-        elif unknown.entries:
-            moved = np.isin(np.arange(value.shape[-1]), unknown.entries)
-            changed[unknown.field] = value * jnp.exp(jnp.where(moved, x, 0.0))
-        else:
-            changed[unknown.field] = value * jnp.exp(x)
-    return dataclasses.replace(model.base, **changed)
+        value = jnp.asarray(changed.get(unknown.field, value_of(base, unknown.field)))
+        moved = np.isin(np.arange(value.shape[-1]), unknown.entries) if unknown.entries else np.ones(value.shape, bool)
+        by = jnp.where(moved, x, 0.0)
+        new = value + by if unknown.added else value * jnp.exp(by)
+        if unknown.field in FROM_ZERO:
+            new = jnp.where(moved & (value == 0), FROM_ZERO[unknown.field] * base.mass * x, new)
+        changed[unknown.field] = new
+    return dataclasses.replace(base, **changed)
+
+
+def value_of(vehicle: Vehicle, field: str) -> Any:
+    """The value of a field. Terms that the vehicle file does not have: rotors slow down as they speed up; all others
+    are zero.
+    """
+    value = getattr(vehicle, field)
+    if value is None and field == "motor_time_constant_down":
+        value = vehicle.motor_time_constant
+    shape = next(f.metadata["shape"] for f in (*quantities(), *terms()) if f.name == field)
+    return np.zeros(shape) if value is None else value
+
+
+def shares(model: Model, q: Array, when: Array) -> Array:
+    """Thrust of each rotor over that of the thrust map, (4,), in a window that begins at this fraction of a flight."""
+    x, y = jnp.sign(model.base.rotor_position).T
+    sides = jnp.stack([y, -x, jnp.asarray(model.base.rotor_spin)])
+    return jnp.exp(q[FACTOR]) * (1 - q[LOST] * when) * (1 + q[UNEVEN] @ sides)
+
+
+def wind_of(q: Array) -> Vec3:
+    """The mean wind of a flight, world, m/s."""
+    return Vec3(q[WIND][0], q[WIND][1], 0.0 * q[0])
 
 
 def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, Any]) -> dict[str, Array]:
@@ -172,12 +220,10 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         start: correction that is added to the measured start of the window, (START,).
         window: `driven`, `when` and the measured start: position, velocity, quaternion, body_rate, rotor_speed.
     """
-    vehicle = vehicle_of(model, p)
-    x, y = jnp.sign(model.base.rotor_position).T
-    sides = jnp.stack([y, -x, jnp.asarray(model.base.rotor_spin)])
-    share = jnp.exp(q[FACTOR]) * (1 - q[LOST] * window["when"]) * (1 + q[UNEVEN] @ sides)
-    plant = Airframe.of(vehicle, STEP, share)
-    before, acting = commanded(model, vehicle, window["driven"])
+    vehicle = vehicle_of(model.base, model.unknowns, p)
+    plant = Airframe.of(vehicle, STEP, shares(model, q, window["when"]))
+    delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
+    before, acting = commanded(delay, window["driven"])
     places = {unknown.name: i for i, unknown in enumerate(model.unknowns)}
     added = {
         name: p[places[name]] if name in places else 0.0 for name in ("motor_curve", "motor_idle", "rotor_inertia")
@@ -189,7 +235,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     first = State(
         window["position"] + start[:3],
         window["velocity"] + start[3:6],
-        _turned(window["quaternion"], start[6:9]),
+        turned(window["quaternion"], start[6:9]),
         window["body_rate"] + start[9:12],
         spun + start[12:16] * model.hover,
     )
@@ -272,13 +318,12 @@ def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) ->
     return dataclasses.replace(now, body_rate=Vec3(rate.x, rate.y, rate.z + turned))
 
 
-def commanded(model: Model, vehicle: Vehicle, driven: Array) -> tuple[Array, Array]:
-    """The mean command that acts in each step, one latency after it was sent: (past, 4) before the window, and (m, 4)
-    in it.
+def commanded(delay: Array | float, driven: Array) -> tuple[Array, Array]:
+    """The mean command that acts in each step, a delay, s, after it was sent: (past, 4) before the window, and (m, 4)
+    in it. `driven` is the integral of the commands.
 
     Commands from before the window's past are assumed to be the same as at its beginning.
     """
-    delay = 0.0 if model.driver == "rotor_speed" else vehicle.latency
     place = jnp.arange(driven.shape[0]) - delay / STEP
     below = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 0, driven.shape[0] - 2)
     part = (place - below)[:, None]
@@ -308,13 +353,13 @@ def _sensed(plant: Airframe, parts: Parts, q: Array, earlier: Array | None = Non
         "specific_force": Vec3(air.x, air.y, air.z + felt).stack() * plant.specific + q[3:6],
         "rotor_speed": jnp.stack(parts.rotor_speed, -1),
         "velocity": velocity - accelerated * late,
-        "quaternion": _turned(parts.attitude.stack(), turn),
+        "quaternion": turned(parts.attitude.stack(), turn),
         "position": parts.position.stack() - velocity * late,
     }
 
 
-def _turned(quaternion: Array, angle: Array) -> Array:
-    """An attitude, rotated by a small angle about its own axes, rad."""
+def turned(quaternion: Array, angle: Array) -> Array:
+    """An attitude, (*n, 4), rotated by a small angle about its own axes, (*n, 3) rad."""
     return Quat.of(quaternion).turned(Vec3.of(angle)).stack()
 
 

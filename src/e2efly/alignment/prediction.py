@@ -1,4 +1,4 @@
-"""Comparison of the identified vehicle and the file's vehicle in predicting unseen windows, open loop."""
+"""Open-loop simulation of windows from their measured starts, and how far it is from what was measured."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,11 +6,12 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from e2efly.alignment.identification import Found
-from e2efly.alignment.model import NUISANCES, START, attitude_error, simulate
+from e2efly.alignment.model import NUISANCES, START, Model, attitude_error, simulate
 from e2efly.alignment.shooting import measured_starts
-from e2efly.alignment.windows import STEP
+from e2efly.alignment.windows import STEP, Windows
 
 
 @dataclass(frozen=True)
@@ -32,35 +33,51 @@ class Prediction:
 def judged(found: Found) -> Prediction:
     """Predict the windows that were held out of the fit."""
     windows = found.windows.some(found.held_out)
-    model, p = found.model, found.p
-    with jax.enable_x64(True):
-        data = measured_starts(model, windows)
+    still = np.zeros((windows.count, len(NUISANCES)))
+    old = simulated(found.model, np.zeros(len(found.p)), still, windows)
+    new = simulated(found.model, found.p, found.fit.q[windows.flight], windows)
 
-        def seen(p: Any, q: np.ndarray) -> dict[str, np.ndarray]:
-            def one(data: dict[str, Any], q: Any) -> dict[str, Any]:
-                return simulate(model, p, q, jnp.zeros(START), data)
+    def wrong(seen: dict[str, np.ndarray], name: str) -> np.ndarray:
+        square = np.sum(off(windows, seen, name) ** 2, -1)
+        return np.sqrt(np.nansum(square, 0) / np.maximum(np.isfinite(square).sum(0), 1))
 
-            return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(data, q))
-
-        still = np.zeros((windows.count, len(NUISANCES)))
-        old, new = seen(np.zeros(len(p)), still), seen(p, found.fit.q[windows.flight])
-
-    def wrong(guess: dict[str, np.ndarray], name: str) -> np.ndarray:
-        there = windows.there[name] > 0
-        if name == "quaternion":
-            quiet = np.where(there[..., None], windows.measured[name], [1.0, 0, 0, 0])
-            left = np.asarray(attitude_error(jnp.asarray(quiet), jnp.asarray(guess[name])))
-        else:
-            left = guess[name] - windows.measured[name]
-        square = np.where(there, np.sum(left**2, -1), np.nan)
-        with np.errstate(invalid="ignore"):
-            count = np.maximum(np.sum(there, 0), 1)
-        return np.sqrt(np.nansum(square, 0) / count)
-
-    names_there = [name for name in windows.measured if windows.there[name].any()]
+    names = [name for name in windows.measured if windows.there[name].any()]
     return Prediction(
         np.arange(windows.steps + 1) * STEP,
-        {name: wrong(old, name) for name in names_there},
-        {name: wrong(new, name) for name in names_there},
+        {name: wrong(old, name) for name in names},
+        {name: wrong(new, name) for name in names},
         windows.measured, old, new,
     )  # fmt: skip
+
+
+def simulated(
+    model: Model, p: np.ndarray, q: np.ndarray, windows: Windows, start: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """The simulated sensor readings of windows, by stream, (n, m + 1, k).
+
+    Args:
+        model: the model to simulate.
+        p: unknowns of the vehicle, (u,).
+        q: nuisances of the flight of each window, (n, len(NUISANCES)).
+        windows: the windows.
+        start: correction that is added to each measured start, (START,). If omitted, none.
+    """
+    first = np.zeros(START) if start is None else start
+    with jax.enable_x64(True):
+        return jax.tree.map(np.asarray, _simulated(model, p, q, first, measured_starts(model, windows)))
+
+
+@jax.jit
+def _simulated(model: Model, p: Array, q: Array, start: Array, data: dict[str, Any]) -> dict[str, Array]:
+    return jax.vmap(lambda q, window: simulate(model, p, q, start, window))(q, data)
+
+
+def off(windows: Windows, seen: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """Simulated minus measured values of a stream, (n, m + 1, k); of an attitude, the angle between the two about body
+    axes, (n, m + 1, 3) rad. NaN where nothing was measured.
+    """
+    there, measured = windows.there[name][..., None] > 0, windows.measured[name]
+    if name == "quaternion":
+        quiet = np.where(there, measured, [1.0, 0, 0, 0])
+        return np.where(there, np.asarray(attitude_error(jnp.asarray(quiet), jnp.asarray(seen[name]))), np.nan)
+    return np.where(there, seen[name] - measured, np.nan)

@@ -1,7 +1,7 @@
 """Replay of flights: the simulator gets the commands that were sent and starts from the measured state."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -96,9 +96,9 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     """Rotor speeds at the start, (4,) rad/s. The motors follow the outputs that the rate loop gives at the measured
     rates.
     """
-    vehicle, before = vehicle_of(model, p), window["before"]
+    vehicle, before = vehicle_of(model.base, model.unknowns, p), window["before"]
     plant = Airframe.of(vehicle, STEP)
-    asked, _ = commanded(model, vehicle, window["driven"])
+    asked, _ = commanded(vehicle.latency, window["driven"])
     law = control_law(COMMAND_MODES["ctbr"])
     controller = model.controller(vehicle)
 
@@ -111,6 +111,12 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
 
     speed, _ = jax.lax.scan(follow, wanted(before[0], asked[0]), (before, asked))
     return jnp.stack(speed)
+
+
+def asking(flown: Stretches, gain: float) -> Stretches:
+    """The sections as if this many times the thrust had been commanded."""
+    more = np.array([gain, 1.0, 1.0, 1.0])
+    return replace(flown, driven=flown.driven * more)
 
 
 def wrong(flown: Stretches, seen: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -16,7 +16,18 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.alignment.model import FACTOR, FORCE, GYRO, NUISANCES, START, Model, attitude_error, simulate
+from e2efly.alignment.model import (
+    FACTOR,
+    FORCE,
+    GYRO,
+    NUISANCES,
+    START,
+    WIND,
+    Model,
+    attitude_error,
+    from_zero,
+    simulate,
+)
 from e2efly.alignment.windows import LENGTH, Windows
 
 HUBER = 2.0
@@ -59,9 +70,13 @@ class Fit:
     """(u, u) covariance of `p`: the sandwich estimate over the windows, which also holds if residuals are not white."""
     assumed: np.ndarray
     """(u, u) covariance of `p` for white residuals: that of Gauss-Newton."""
+    between: np.ndarray
+    """(u,) standard deviations of `p` by the spread between flights; zeros for one flight."""
     noise: dict[str, float]
     """Spread of each sensor about the fitted model."""
     iterations: int
+    squares: dict[str, np.ndarray]
+    """By sensor, (windows,): mean square of its residuals. NaN where nothing was measured."""
 
 
 def fit(
@@ -100,6 +115,7 @@ def _fit(
     if fixed is not None:
         prior_p[fixed] = 1e-6
     prior_q = np.array([sigma for _, sigma in NUISANCES])
+    prior_q[WIND] = 1e-6  # windows this short do not tell wind from drag
     if flights == 1 or model.driver == "rotor_speed":
         prior_q[FACTOR] = 1e-6  # one flight cannot tell its own factor from the vehicle's
     # without poses, a bias cannot be distinguished from errors of the model
@@ -112,6 +128,7 @@ def _fit(
     least = np.full(u, -np.inf)
     if model.driver in ("motor", "motor_and_rate"):
         least[[x.field == "latency" for x in unknowns]] = -float(model.base.latency)
+    least[from_zero(model.base, unknowns) > 0] = 0.0
     q, starts = np.zeros((flights, v)), np.zeros((windows.count, START))
     noise = {name: NOISE[name] for name in windows.measured}
     data = _data(model, windows)
@@ -126,7 +143,7 @@ def _fit(
     def total(p: np.ndarray, q: np.ndarray, costs: np.ndarray) -> float:
         return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
 
-    damping, i = 1e-3, 0
+    damping, i, held = 1e-3, 0, np.zeros(0, int)
     at = partial(_at, model, data, free)
     cost = total(p, q, at(_costs, p, q, starts, noise)["cost"])
     terms = at(_slopes, p, q, starts, noise)
@@ -175,7 +192,29 @@ def _fit(
     np.add.at(groups, group, each)
     inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
     sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
-    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], noise, i)
+    between = np.zeros(u)
+    if flights > 1:
+        pulled = np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
+        stiff = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+        stiff[held, held] *= 1e12
+        between = _between(terms, windows.flight, flights, pulled, stiff)[:u]
+    left = at(_costs, p, q, starts, noise)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = {name: left[f"square/{name}"] / left[f"sum/{name}"] for name in noise}
+    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], between, noise, i, squares)
+
+
+def _between(
+    terms: dict[str, Any], flight: np.ndarray, flights: int, pulled: np.ndarray, stiff: np.ndarray
+) -> np.ndarray:
+    """Standard deviations by the jackknife over flights: each is left out in turn, and the others take one step."""
+    u = terms["H"].shape[1] - len(NUISANCES)
+    steps = []
+    for f in range(flights):
+        kept = {k: terms[k][flight != f] for k in ("H", "g")}
+        H, g = _assembled(kept, flight[flight != f], flights, u, len(NUISANCES))
+        steps.append(np.linalg.solve(H + stiff, g + pulled))
+    return np.sqrt((flights - 1) * np.var(steps, axis=0))
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:

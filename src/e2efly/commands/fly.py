@@ -1,8 +1,6 @@
 """`e2efly fly`: no JAX, so that it starts at once on a companion computer."""
 
 import dataclasses
-import json
-import platform
 import sys
 import time
 from contextlib import ExitStack, suppress
@@ -12,24 +10,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from e2efly import __version__
 from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
+from e2efly.commands.fly_meta import record_meta
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.terminal import Terminal
 from e2efly.flight.betaflight.client import SCHEDULE, Client
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.link import Link, open_link
-from e2efly.flight.betaflight.row import Row, problems
+from e2efly.flight.betaflight.row import problems
 from e2efly.flight.betaflight.settings_check import check_hover, examine, hover_schedule
 from e2efly.flight.betaflight.watchdog import WatchedLink
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.commander.sources import open_commands
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, excitation
-from e2efly.flight.excitation import NAME as EXCITATION
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, NAMES, ExcitationOptions, StepsOptions, excitation
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
-from e2efly.flight.log_record import Log, Logs
+from e2efly.flight.log_record import Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
 from e2efly.flight.pilot.fence import check_course
@@ -66,8 +63,9 @@ class Fly:
     """Fly a Betaflight quadrotor. The pilot's switches decide. See docs/flying.md before the first flight."""
 
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
-    """A policy.onnx, a run directory, or a task (the zoo's policy). `excitation` flies the manoeuvres that
-    identification needs, in place of a policy. If omitted: take-off, hover and landing only.
+    """A policy.onnx, a run directory, or a task (the zoo's policy). In place of a policy, `excitation` flies the
+    manoeuvres that identification needs, and `steps` those that alignment needs. If omitted: take-off, hover and
+    landing only.
     `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
@@ -117,6 +115,8 @@ class Fly:
     """State of the vehicle in which the policy may take over."""
     excitation: ExcitationOptions = ExcitationOptions()
     """Manoeuvres that `excitation` flies."""
+    steps: StepsOptions = StepsOptions()
+    """Steps that `steps` flies."""
 
 
 def parse(arguments: list[str]) -> Fly:
@@ -151,6 +151,8 @@ class _Prepared:
     """What `--guard filter` keeps inside the fence."""
     policy: Path | None
     """The policy's file. None: no policy flies, or the manoeuvres of identification do."""
+    goal: Route | None
+    """Where the policy flies to. None: the usual course of its task."""
     loaded: Policy | None
     runtime: Runtime | None
     """What acts in mode POLICY. None: nothing, or another program."""
@@ -160,6 +162,11 @@ class _Prepared:
     @property
     def contract(self) -> Any:
         return self.runtime.policy.contract if self.runtime else None
+
+
+def _in_place(options: Fly) -> str:
+    """The name of what flies in place of a policy. Empty: a policy, or nothing."""
+    return str(options.policy) if str(options.policy) in NAMES else ""
 
 
 def _chosen(options: Fly, console: Terminal) -> tuple[Path | None, Route | None]:
@@ -182,7 +189,7 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
     check_settings(settings)
     if options.latency is not None and not 0 <= options.latency <= SLOWEST:
         raise ValueError(f"--latency is {options.latency}; accepted: 0 to {SLOWEST:g} s")
-    excited = options.policy == Path(EXCITATION)
+    excited = _in_place(options)
     policy, goal = (None, None) if excited else _chosen(options, console)
     loaded = None if policy is None else load_policy(policy)
     if options.commands is not None and options.policy is not None:
@@ -220,13 +227,13 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
             console.print(line, style="dim")
         runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
     if excited:
-        acts, course = excitation(body, settings, options.excitation, options.latency)
+        acts, course = excitation(body, settings, getattr(options, excited), options.latency)
         runtime = Runtime.of(acts, course, body, envelope=options.envelope)
     saved = options.throttle_map
     known = throttle_map.from_json(_read(saved, "--throttle-map"), body) if saved else None
     if options.image and loaded is None:
         raise ValueError(f"--image is {options.image[0]!r}; accepted: none, as no policy sees it")
-    return _Prepared(flies, body, hover, filter, policy, loaded, runtime, known)
+    return _Prepared(flies, body, hover, filter, policy, goal, loaded, runtime, known)
 
 
 def run(options: Fly) -> int:
@@ -240,7 +247,7 @@ def run(options: Fly) -> int:
         OSError: when the link, the pose source or the log cannot be opened.
     """
     raise_at_interrupt()  # its link and its log are closed in order
-    console, settings, excited = Terminal(), options.flight, options.policy == Path(EXCITATION)
+    console, settings, excited = Terminal(), options.flight, _in_place(options)
     plan = _prepared(options, console)
     body, hover, contract = plan.body, plan.hover, plan.contract
     targets = targets_of(options.live)
@@ -286,7 +293,7 @@ def run(options: Fly) -> int:
             stack.callback(shown.close)
         log = Logs((telemetry, *([live] if targets else []), *([] if shown is None else [shown])))
         bridge.log = log
-        _record_meta(log, bridge, body, contract.to_json() if contract else "", rows, options.hover)
+        record_meta(log, bridge, body, contract.to_json() if contract else "", rows, _flies(options, plan))
         rate = loop_rate(contract.control_rate_hz) if contract else LOWEST_RATE
         say = Speaker(sys.stdout)
         stack.callback(say.close)
@@ -308,7 +315,9 @@ def run(options: Fly) -> int:
         live.close()
         _tell(say, timing, telemetry, live)
         path.with_suffix(".throttle.json").write_text(throttle_map.as_json(bridge.map), encoding="utf-8")
-        if excited:
+        if excited == "steps":
+            say(f"Next: e2efly align {path} --vehicle {options.vehicle}")
+        elif excited:
             say(f"Next: e2efly identify flight {path} --vehicle {options.vehicle} --mass KG SIGMA")
         learned = f"factor {bridge.map.scale:.2f}, {path.with_suffix('.throttle.json')}"
         say(f"Next: e2efly fly-report {path}; throttle map: {learned}")
@@ -388,18 +397,7 @@ def _identify_again(
     return info
 
 
-def _record_meta(log: Log, bridge: Bridge, body: Vehicle, contract: str, rows: tuple[Row, ...], hover: str) -> None:
-    settings = {
-        "hover": hover,
-        "flight": dataclasses.asdict(bridge.settings),
-        "controller": {row.setting: row.value for row in rows},
-        "throttle_map": json.loads(throttle_map.as_json(bridge.map)),
-    }
-    versions = {
-        "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),
-        "firmware": bridge.info.firmware, "msp": ".".join(map(str, bridge.info.api)),
-    }  # fmt: skip
-    log.record("meta", time.monotonic(), {
-        "contract": contract, "vehicle": f"{body.name} {body.hash}", "settings": json.dumps(settings),
-        "versions": json.dumps(versions),
-    })  # fmt: skip
+def _flies(options: Fly, plan: _Prepared) -> dict[str, Any]:
+    """What flies, for the log: controller of the hover, file of the policy, and where it flies to."""
+    policy = None if plan.policy is None else str(plan.policy.resolve())
+    return {"hover": options.hover, "policy": policy, "goal": None if plan.goal is None else vars(plan.goal)}

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from e2efly.commands.terminal import Terminal, headed
 
+UNFILTERED = "unfiltered_noise_rad_s"
 LONGEST = 20
 """At most this many of the times at which the filter intervened are printed."""
 
@@ -20,11 +21,11 @@ class FlyReport:
     """Draw a flight: tracks, response to commands, latency, timing, and the modes with the reason for each."""
 
     log: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="FILE")]]
-    """A flight log (.mcap)."""
+    """A flight log (.mcap), or a Betaflight blackbox log alone, whose rate loop is analysed."""
     out: Path | None = None
     """Folder for the figures. If omitted, LOG_report."""
     blackbox: Path | None = None
-    """A Betaflight blackbox log of the same flight, to be drawn over it."""
+    """A Betaflight blackbox log of the same flight, to be drawn over it. Its rate loop is analysed (pid.png)."""
     bag1: Path | None = None
     """Also write a ROS 1 bag."""
     bag2: Path | None = None
@@ -37,20 +38,27 @@ def run(options: FlyReport) -> int:
     Raises:
         ValueError: for files that cannot be read, or that exist already.
     """
+    from e2efly.config.storage import finite
     from e2efly.logs.bags import export_bag
     from e2efly.logs.flight_log import read_log
+    from e2efly.logs.readers import BLACKBOX, format_of
     from e2efly.viewing.flight_data import summary
     from e2efly.viewing.flight_figures import draw, laid_over
+    from e2efly.viewing.pid_analysis import analysis_of, pid_numbers
 
+    console, out = Terminal(), options.out or options.log.with_name(f"{options.log.stem}_report")
+    if format_of(options.log).name == BLACKBOX:
+        return _report_blackbox(options, out, console)
     log = read_log(options.log)
     laid = laid_over(log, options.blackbox) if options.blackbox else None
-    out = options.out or options.log.with_name(f"{options.log.stem}_report")
     out.mkdir(parents=True, exist_ok=True)
     table = summary(log, *laid) if laid else summary(log)
-    (out / "summary.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    found = analysis_of(log, laid[0] if laid else None)
+    table["pid"] = finite({"reason": found} if isinstance(found, str) else pid_numbers(found))
+    _write(out, table)
     draw(log, out, laid)
-    console = Terminal()
     _print(console, table)
+    console.print(_pid(table["pid"]))
     for bag, version in ((options.bag1, 1), (options.bag2, 2)):
         if bag:
             counts = export_bag(log, bag, version)
@@ -59,6 +67,44 @@ def run(options: FlyReport) -> int:
     if table["align"]:
         console.print(f"To make the simulator answer as this vehicle did: {table['align']}")
     return 0
+
+
+def _report_blackbox(options: FlyReport, out: Path, console: Console) -> int:
+    """Analyse the rate loop of every session of a blackbox log that has no flight log."""
+    from e2efly.config.storage import finite
+    from e2efly.logs.blackbox import read_blackbox
+    from e2efly.viewing.flight_figures import draw_blackbox
+
+    for name in ("blackbox", "bag1", "bag2"):
+        if (value := getattr(options, name)) is not None:
+            raise ValueError(f"--{name} is {str(value)!r}; accepted: with a flight log (.mcap), not with a blackbox")
+    rows = finite(draw_blackbox(options.log, read_blackbox(options.log, tuning=True), out))
+    _write(out, {"file": str(options.log), "sessions": rows})
+    for row in rows:
+        console.print(f"{options.log}, session {row['session']}: {row['duration_s']:.1f} s", markup=False)
+        for note in row["notes"]:
+            console.print(note, style="dim", markup=False)
+        console.print(_pid(row))
+    console.print(f"Figures and summary.json: {out}")
+    return 0
+
+
+def _write(out: Path, table: dict[str, Any]) -> None:
+    (out / "summary.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _pid(row: dict[str, Any]) -> Table | str:
+    """The analysis of a rate loop as a table, or the reason why there is none."""
+    if "reason" in row:
+        return f"no PID analysis: {row['reason']}"
+    table = headed("axis", "step response", "gyro above 80 Hz, filtered / unfiltered", "peak", "P / I / D / F")
+    for axis, found in row["axes"].items():
+        noise = " / ".join("-" if x is None else f"{x:.3g}" for x in (found[k] for k in ("noise_rad_s", UNFILTERED)))
+        terms = " / ".join(f"{100 * x:.2g}" if x is not None else "-" for x in map(found["terms_rms"].get, "PIDF"))
+        table.add_row(
+            axis, _told(found["step_response"]), f"{noise} rad/s", f"{found['noise_peak_hz']:.0f} Hz", f"{terms} %"
+        )
+    return table
 
 
 def _print(console: Console, table: dict[str, Any]) -> None:
@@ -104,11 +150,7 @@ def _lines(table: dict[str, Any]) -> list[tuple[str, str]]:
         (" (blackbox)", table.get("blackbox", {}).get("rate_response")),
     ):
         for axis, r in (responses or {}).items():
-            told = r["reason"] or (
-                f"delay {1e3 * r['delay_s']:.0f} ms, 63 % at {1e3 * r['rise_63_s']:.0f} ms, "
-                f"overshoot {r['overshoot']:.0%}"
-            )
-            rows.append((f"{axis} rate{source}", told))
+            rows.append((f"{axis} rate{source}", _told(r)))
     loop = table["loop"]
     rows.append(
         (
@@ -125,6 +167,12 @@ def _lines(table: dict[str, Any]) -> list[tuple[str, str]]:
     if voltage := table["battery"]["voltage_v"]:
         rows.append(("battery", f"{voltage['first']:.2f} to {voltage['last']:.2f} V, lowest {voltage['min']:.2f} V"))
     return rows
+
+
+def _told(r: dict[str, Any]) -> str:
+    return r["reason"] or (
+        f"delay {1e3 * r['delay_s']:.0f} ms, 63 % at {1e3 * r['rise_63_s']:.0f} ms, overshoot {r['overshoot']:.0%}"
+    )
 
 
 def _ms(spread: dict[str, float] | None, before: str = "") -> str:

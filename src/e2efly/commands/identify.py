@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from e2efly.commands.log_options import LogOptions, show_notes
+from e2efly.commands.log_options import LogOptions, read_checked
 from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.names import unknown
 from e2efly.config.storage import held, write_json
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate
     from e2efly.alignment.identification import Found
     from e2efly.alignment.prediction import Prediction
-    from e2efly.logs.readers import LogReading
     from e2efly.logs.recording import Record
 
 KINDS = ("parts", "pendulum", "stand", "flight", "step")
@@ -91,7 +90,7 @@ def _identify(options: Identify) -> int:
     for kind in ("flight", "step"):
         if files[kind]:
             known = merged(base, fuse(said))
-            records = _records(files[kind], reading, known, console)
+            records = read_checked(files[kind], reading, known, console)
             found[kind] = _flown(known, base, records, kind == "step", console)
             said += _with_mass(found[kind].estimates, said)
     fused = fuse(said)
@@ -111,8 +110,11 @@ def _identify(options: Identify) -> int:
     write_json(options.out / "identified.json", report)
     console.print(_table(base, fused))
     for each in found.values():
+        for line in _left_over(each):
+            console.print(line, style="dim")
         for refusal in each.refusals:
             console.print(str(refusal), style="dim")
+        _warn(each, console)
     if found and not any(e.name == "mass" for e in said):
         console.print(
             f"mass is the file's, {base.mass:g} kg: flights give thrust, inertia and drag over it. Weigh the vehicle "
@@ -154,21 +156,6 @@ def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
     return files
 
 
-def _records(files: Sequence[Path], reading: "LogReading", vehicle: Vehicle, console: Console) -> "list[Record]":
-    from e2efly.alignment.checks import checked
-    from e2efly.logs.blackbox_merge import with_blackboxes
-    from e2efly.logs.readers import read_part
-
-    read = with_blackboxes([record for path in files for record in read_part(path, reading)])
-    show_notes(read, console)
-    records = checked(read, vehicle)
-    show_notes(records, console, read)
-    for record in records:
-        rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
-        console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}")
-    return records
-
-
 def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", step: bool, console: Console) -> "Found":
     from e2efly.alignment.identification import identify
     from e2efly.simulation.device import prepare
@@ -181,6 +168,40 @@ def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", ste
             believed=believed,
             step=step,
             told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}"),
+        )
+
+
+def _left_over(found: "Found") -> list[str]:
+    """What each flight had besides the vehicle, and what the fit leaves over, in words."""
+    from e2efly.alignment.identification import nuisances
+    from e2efly.alignment.model import UNITS
+    from e2efly.logs.recording import KINDS
+
+    lines = []
+    for i, flight in enumerate(nuisances(found)):
+        told = [
+            f"{name} {value:.2g} {UNITS.get(name.split('_')[0], '')}".rstrip()
+            for name, value in flight.items()
+            if abs(value) > 1e-4
+        ]
+        lines.append(f"flight {i + 1}: {', '.join(told)}")
+    units = {name: kind.unit for name, kind in KINDS.items()} | {"quaternion": "rad"}
+    for part in found.parts:
+        told = [
+            f"{name.replace('_', ' ')} {value:.2g} {units.get(name, 'rad/s')}" for name, value in part.noise.items()
+        ]
+        lines.append(f"left over (rms): {', '.join(told)}")
+    return lines
+
+
+def _warn(found: "Found", console: Console) -> None:
+    alarms = [each for each in found.misfits if each.alarming]
+    if alarms:
+        console.print(
+            f"The model lacks something that this vehicle has ({'; '.join(map(str, alarms))}). The standard deviations "
+            "are widened accordingly. Rotor speeds in the log, 200 times a second, tell forces, rotors and rate loop "
+            "apart.",
+            style="yellow",
         )
 
 
@@ -238,7 +259,14 @@ def _report(
                 label: dict(zip((u.name for u in each.model.unknowns), map(float, other), strict=True))
                 for label, other in each.structures.items()
             },
-            "noise": each.fit.noise,
+            "noise": {name: value for part in each.parts for name, value in part.noise.items()},
+            "misfit": [{"sensor": m.sensor, "share": m.share, "growth": m.growth} for m in each.misfits],
+            "response": None
+            if each.response is None
+            else [
+                {"name": u.name, "found": float(x), "sigma": float(off)}
+                for u, x, off in zip(each.response.unknowns, each.response.p, each.response.sigma, strict=True)
+            ],
             "iterations": each.fit.iterations,
             "refused": [str(refusal) for refusal in each.refusals],
             "held_out": {
@@ -258,7 +286,7 @@ def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
 
     table = headed("parameter", "file", "identified", "sigma", "source")
     for name, e in fused.items():
-        own = np.atleast_1d(np.asarray(getattr(base, name), float))
+        own = np.broadcast_to(np.asarray(getattr(base, name), float), np.atleast_1d(e.value).shape)  # None: NaN
         for i, (before, value, sigma) in enumerate(
             zip(own.flat, np.atleast_1d(e.value).flat, np.atleast_1d(e.sigma).flat, strict=True)
         ):
@@ -266,7 +294,7 @@ def _table(base: Vehicle, fused: "dict[str, Estimate]") -> Table:
                 label = name if own.size == 1 else f"{name}[{i}]"
                 table.add_row(
                     label,
-                    f"{before:.4g}",
+                    f"{before:.4g}" if np.isfinite(before) else "none",
                     f"{value:.4g}",
                     percent(sigma / abs(value)) if value else f"{sigma:.2g}",
                     e.source,

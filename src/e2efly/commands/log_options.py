@@ -7,9 +7,11 @@ from rich.console import Console
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
+    from pathlib import Path
 
     from e2efly.logs.readers import LogReading
     from e2efly.logs.recording import Record
+    from e2efly.vehicles.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -44,3 +46,25 @@ def show_notes(records: "Sequence[Record]", console: Console, known: "Sequence[R
         for note in record.notes:
             if note not in told:
                 console.print(f"{record.path.name}: {note}", style="dim", markup=False)
+
+
+def read_checked(
+    files: "Sequence[Path]", reading: "LogReading", vehicle: "Vehicle", console: Console
+) -> "list[Record]":
+    """The flights of these logs, checked against the vehicle; what was left out, changed and found is printed.
+
+    Raises:
+        ValueError: naming the log, what is wrong with it, and what is accepted.
+    """
+    from e2efly.alignment.checks import checked
+    from e2efly.logs.blackbox_merge import with_blackboxes
+    from e2efly.logs.readers import read_part
+
+    read = with_blackboxes([record for path in files for record in read_part(path, reading)])
+    show_notes(read, console)
+    records = checked(read, vehicle)
+    show_notes(records, console, read)
+    for record in records:
+        rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())
+        console.print(f"{record.path.name}: {record.duration:.1f} s; {rates}", markup=False)
+    return records

@@ -1,11 +1,12 @@
 """Flights whose logs show a vehicle's parameters: lines for the drag, doublets and chirps for the rest. No JAX.
 
-`lines` and `doublets` are for unlimited space. `excite` flies them inside a room.
+`lines` and `doublets` are for unlimited space. `excite` flies a schedule inside a room.
 """
 
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -155,49 +156,108 @@ class ManoeuvreProgress:
         return ManoeuvreProgress(np.clip(position, room.low + inner, room.high - inner), yaw)
 
 
+@dataclass(frozen=True)
+class Wish:
+    """What a schedule wants in one control step."""
+
+    velocity: np.ndarray
+    """(3,) velocity to steer for, world, m/s."""
+    rates: np.ndarray
+    """(3,) addition to the body rates, rad/s."""
+    push: float
+    """Addition to the thrust over mass, m/s^2."""
+    yaw: float
+    """Heading to hold, rad."""
+    leg: int = 0
+    """Index of the line that is flown."""
+    since: float = 0.0
+    """Start time of this line, s from the beginning."""
+    bare: bool = False
+    """Whether nothing steers: the body rates are `rates` alone, and the thrust is that of hover and `push`."""
+
+
+class Schedule(Protocol):
+    """What is flown, and when."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the flight, s."""
+        ...
+
+    def wish(
+        self, vehicle: Vehicle, room: ManoeuvreRoom, before: ManoeuvreProgress, time: float, motion: Motion
+    ) -> Wish:
+        """What it wants at a time, s since the beginning."""
+        ...
+
+
+@dataclass(frozen=True)
+class Manoeuvres:
+    """Lines with doublets, then chirps, then steps of the heading with kicks of the thrust."""
+
+    seconds: float
+    """Duration, s."""
+    speed: float
+    """Speed of the fastest line, m/s."""
+
+    def wish(
+        self, vehicle: Vehicle, room: ManoeuvreRoom, before: ManoeuvreProgress, time: float, motion: Motion
+    ) -> Wish:
+        """What it wants at a time, s since the beginning."""
+        position = motion.position.stack()
+        stop, share = room.stop(position, motion.velocity.stack()), time / self.seconds
+        wish = Wish(homewards(before.centre, position), np.zeros(3), 0.0, before.yaw, before.leg, before.since)
+        if share < LINES:
+            leg, since, along = before.leg, before.since, _LINES[before.leg % len(_LINES)]
+            ahead = ((along > 0) & (stop > room.high)) | ((along < 0) & (stop < room.low))
+            if ahead.any() or time - since >= LEG:
+                leg, since = leg + 1, time
+                along = _LINES[leg % len(_LINES)]
+            wanted = np.where(along != 0, np.clip(self.speed * along, -room.fastest, room.fastest), wish.velocity)
+            rates, push = doublets(time)
+            return dataclasses.replace(wish, velocity=wanted, rates=rates, push=push, leg=leg, since=since)
+        if share < LINES + CHIRPS:
+            rates, push = chirps((share - LINES) * self.seconds, CHIRPS * self.seconds)
+            return dataclasses.replace(wish, rates=rates, push=push)
+        push = kicks((share - LINES - CHIRPS) * self.seconds, kick_for(vehicle, room))
+        turned = YAWS[min(int((share - LINES - CHIRPS) / (1 - LINES - CHIRPS) * len(YAWS)), len(YAWS) - 1)]
+        return dataclasses.replace(wish, push=push, yaw=before.yaw + turned)
+
+
+def homewards(centre: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """The velocity with which a vehicle returns to its place, (3,) m/s."""
+    return np.clip(PULL * (centre - position), -PULLED, PULLED)
+
+
 def excite(
     vehicle: Vehicle,
     room: ManoeuvreRoom,
-    speed: float,
-    duration: float,
+    schedule: Schedule,
     before: ManoeuvreProgress,
     time: float,
     motion: Motion,
 ) -> tuple[ManoeuvreProgress, Ctbr]:
-    """One control step: lines with doublets, then chirps, then steps of the heading with kicks of the thrust. Pure. The
-    gains of `vehicle` are used to steer. `speed` is that of the fastest line, m/s. `duration` is that of the whole
-    flight, and `time` the time since its beginning, s. `before` is the state from `Progress.begin` or from the last
-    step.
+    """One control step of a schedule. Pure. The gains of `vehicle` are used to steer. `time` is that since the
+    beginning, s. `before` is the state from `ManoeuvreProgress.begin` or from the last step.
 
     Returns:
         The state for the next step, and the command.
     """
     position, velocity = motion.position.stack(), motion.velocity.stack()
-    stop = room.stop(position, velocity)
-    share = time / duration
-    pull = np.clip(PULL * (before.centre - position), -PULLED, PULLED)
-    leg, since, yaw = before.leg, before.since, before.yaw
-    rates, push, wanted = np.zeros(3), 0.0, pull
-    if share < LINES:
-        along = _LINES[leg % len(_LINES)]
-        ahead = ((along > 0) & (stop > room.high)) | ((along < 0) & (stop < room.low))
-        if ahead.any() or time - since >= LEG:
-            leg, since = leg + 1, time
-            along = _LINES[leg % len(_LINES)]
-        wanted = np.where(along != 0, np.clip(speed * along, -room.fastest, room.fastest), pull)
-        rates, push = doublets(time)
-    elif share < LINES + CHIRPS:
-        rates, push = chirps((share - LINES) * duration, CHIRPS * duration)
+    stop, wish = room.stop(position, velocity), schedule.wish(vehicle, room, before, time, motion)
+    over, under = stop > room.high, stop < room.low
+    trim, yaw = before.trim, wish.yaw
+    if wish.bare and not (over | under).any():
+        command = limited(vehicle, max(GRAVITY + trim + wish.push, 0.0), Vec3(*wish.rates))
     else:
-        push = kicks((share - LINES - CHIRPS) * duration, kick_for(vehicle, room))
-        yaw += YAWS[min(int((share - LINES - CHIRPS) / (1 - LINES - CHIRPS) * len(YAWS)), len(YAWS) - 1)]
-    # at any time: a vehicle that would come to rest outside flies inwards
-    wanted = np.where(stop > room.high, np.minimum(wanted, -INWARDS), wanted)
-    wanted = np.where(stop < room.low, np.maximum(wanted, INWARDS), wanted)
-    trim = trimmed(before.trim, float(wanted[2] - velocity[2]), min(max(time - before.time, 0.0), 0.1))
-    found = reach(vehicle, motion, Vec3(*wanted), np.float64(yaw))
-    command = limited(vehicle, max(float(found.thrust) + trim + push, 0.0), found.rate + Vec3(*rates))
-    return ManoeuvreProgress(before.centre, before.yaw, leg, since, trim, time), command
+        # at any time: a vehicle that would come to rest outside flies inwards
+        wanted = np.where(over, np.minimum(wish.velocity, -INWARDS), wish.velocity)
+        wanted = np.where(under, np.maximum(wanted, INWARDS), wanted)
+        trim = trimmed(trim, float(wanted[2] - velocity[2]), min(max(time - before.time, 0.0), 0.1))
+        found = reach(vehicle, motion, Vec3(*wanted), np.float64(yaw))
+        push, rates = (0.0, np.zeros(3)) if wish.bare else (wish.push, wish.rates)
+        command = limited(vehicle, max(float(found.thrust) + trim + push, 0.0), found.rate + Vec3(*rates))
+    return ManoeuvreProgress(before.centre, before.yaw, wish.leg, wish.since, trim, time), command
 
 
 def kick_for(vehicle: Vehicle, room: ManoeuvreRoom) -> float:

@@ -9,8 +9,8 @@ controller started.
 import math
 from array import array
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,11 @@ _WANTED = (
     "time", *(f"gyroADC[{i}]" for i in range(3)), *(f"setpoint[{i}]" for i in range(3)),
     *(f"motor[{i}]" for i in range(4)),
 )  # fmt: skip
+TERMS = {"P": "axisP", "I": "axisI", "D": "axisD", "F": "axisF"}
+"""Terms of the rate loop by name, with the fields that log them."""
+_TUNING = ("gyroUnfilt", "debug", *TERMS.values())  # read on request alone, because of their size
+_SCALED = 6  # the debug mode GYRO_SCALED: the gyro before its filters, deg/s
+_WHOLE = 1000.0  # a term that alone asks for the full range of the mixer
 _TOLD = 3  # reasons that an error or a note tells
 _STEP = 1000  # largest denominator of the share of loops that are logged
 
@@ -54,6 +59,11 @@ class Blackbox:
     """The firmware, from the header."""
     session: int
     """Number of the session in the file, from 1."""
+    unfiltered: np.ndarray | None = None
+    """(n, 3) body rate before the gyro's filters, FLU, rad/s. None if it was not logged, or not requested."""
+    terms: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """By the names of `TERMS`, (n, 3) what each term of the rate loop asks for about each axis, as a share of the
+    mixer's full range. Empty if they were not logged, or not requested."""
     reach: tuple[float, float] = (0.0, 1.0)
     """The ESC commands at which `motor` is 0 and 1. Here 0 is 1000 us or DShot's 48, and 1 is 2000 us or DShot's
     2047."""
@@ -81,8 +91,9 @@ class LogClock:
     """How much faster the blackbox's clock runs over the overlap, as a ratio minus 1."""
 
 
-def read_blackbox(path: str | Path) -> list[Blackbox]:
-    """The sessions of a blackbox log that have frames: at most `SESSIONS`, with at most `FRAMES` frames each.
+def read_blackbox(path: str | Path, tuning: bool = False) -> list[Blackbox]:
+    """The sessions of a blackbox log that have frames: at most `SESSIONS`, with at most `FRAMES` frames each. With
+    `tuning`, also the unfiltered gyro and the terms of the rate loop.
 
     Raises:
         ValueError: if there is no such file, no session with gyro data in it, or no decoder.
@@ -101,7 +112,7 @@ def read_blackbox(path: str | Path) -> list[Blackbox]:
     reasons: list[str] = []
     for number, (start, end) in enumerate(places[:SESSIONS], 1):
         try:
-            sessions.append(_session(decoder.FlightLogParser(data, start, end), number))
+            sessions.append(_session(decoder.FlightLogParser(data, start, end), number, tuning))
         except Exception as error:  # the decoder trusts its input: one bad session must not affect the others
             reasons.append(f"session {number}: {type(error).__name__}: {error}")
     told = reasons[:_TOLD] + ([f"{len(reasons) - _TOLD} more without frames"] if len(reasons) > _TOLD else [])
@@ -117,8 +128,9 @@ def read_blackbox(path: str | Path) -> list[Blackbox]:
 class _Frames:
     """The wanted fields of the frames of a session."""
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self.fields = [name for name in _WANTED if name in names]
+    def __init__(self, names: Sequence[str], tuning: bool) -> None:
+        more = [f"{name}[{i}]" for name in _TUNING for i in _AXES] if tuning else []
+        self.fields = [name for name in (*_WANTED, *more) if name in names]
         self._places, self._numbers = [names.index(name) for name in self.fields], array("d")
 
     def __len__(self) -> int:
@@ -154,7 +166,7 @@ def _bounded(stream: Any, fields: int, markers: frozenset[str]) -> Any:
     return stream
 
 
-def _session(parser: Any, number: int) -> Blackbox:
+def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
     parser.parse_header()
     names, header = parser.main_field_names, parser.sys_config
     most = max(frame["count"] for frame in parser.frame_defs.values())
@@ -165,7 +177,7 @@ def _session(parser: Any, number: int) -> Blackbox:
         raise ValueError(f"P interval is {step[0]}/{step[1]}; accepted: a share of up to 1, as 1/2")
     if missing := [name for name in ("time", *(f"gyroADC[{i}]" for i in _AXES)) if name not in names]:
         raise ValueError(f"field {missing[0]} was not logged")
-    parser.main_frames = kept = _Frames(names)
+    parser.main_frames = kept = _Frames(names, tuning)
     parser.gps_frames, parser.slow_frames, parser.events = deque(maxlen=0), deque(maxlen=0), deque(maxlen=0)
     parser.stream = _bounded(parser.stream, most, frozenset(parser.frame_defs))
     notes = ()
@@ -187,6 +199,13 @@ def _session(parser: Any, number: int) -> Blackbox:
         known = all(key in kept.fields for key in keys)
         return frames[:, [kept.fields.index(key) for key in keys]] if known else np.full((len(frames), count), np.nan)
 
+    def logged(name: str) -> np.ndarray | None:
+        found = columns(name, 3)
+        return None if np.isnan(found).any() else found
+
+    raw, terms = logged("gyroUnfilt"), {name: logged(key) for name, key in TERMS.items()}
+    if raw is None and int(header.get("debug_mode", 0)) == _SCALED:
+        raw = logged("debug")
     fine = 0.1 if int(header.get("blackbox_high_resolution", 0)) else 1.0
     low, high = map(float, header["motorOutput"])
     time = frames[:, 0]
@@ -198,6 +217,8 @@ def _session(parser: Any, number: int) -> Blackbox:
         motor=(columns("motor", 4) - low) / max(high - low, 1.0),
         firmware=str(header.get("Firmware revision") or "unknown"),
         session=number,
+        unfiltered=None if raw is None else np.radians(raw * fine),
+        terms={name: values / _WHOLE for name, values in terms.items() if values is not None},
         reach=((low - least) / (most - least), (high - least) / (most - least)),
         notes=notes,
     )

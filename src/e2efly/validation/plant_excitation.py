@@ -11,7 +11,17 @@ import numpy as np
 
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.control.cascade import limited
-from e2efly.control.manoeuvres import DURATION, doublets, lines, softened, trimmed
+from e2efly.control.manoeuvres import (
+    DURATION,
+    ManoeuvreProgress,
+    ManoeuvreRoom,
+    doublets,
+    excite,
+    lines,
+    softened,
+    trimmed,
+)
+from e2efly.control.step_schedule import Steps
 from e2efly.logs.recording import Record, Stream
 from e2efly.validation.log import motion_streams
 from e2efly.validation.plant import Delay, Plant, PlantMotion, RigidState
@@ -23,6 +33,8 @@ RATE, POSES, COMMANDS = 250.0, 100.0, 50.0
 LIFT, WEAKEST = 2.0, 8.0
 """Growth of the trim, 1/s^2, and its limit, m/s^2. The flight controller may be tuned to far more thrust than there is,
 and the vehicle must not sink to the ground."""
+WIDE = ManoeuvreRoom(np.array([-50.0, -50.0, 0.0]), np.array([50.0, 50.0, 100.0]), 3.5, 0.45)
+"""The room of a flight of steps."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +75,10 @@ def fly_excitation(
     speed: float = 5.0,
     sag: float = 0.0,
     pulses: bool = True,
+    steps: Steps | None = None,
 ) -> Record:
-    """Fly lines and doublets on a plant in the command mode ctbr, and record everything without errors.
+    """Fly lines and doublets on a plant in the command mode ctbr, and record everything without errors. With `steps`,
+    fly these.
 
     The plant's flight controller is tuned to `believed`, whose gains steer, softened for a vehicle that is not known.
     `latency` is the time from sending a command to the rate loop, s; `speed` that of the fastest line, m/s; `sag` the
@@ -76,6 +90,8 @@ def fly_excitation(
     hover = np.array([GRAVITY, 0.0, 0.0, 0.0])
     plant.reset(RigidState(np.array([0.0, 0.0, 50.0]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
     delay, ticks = Delay.of(latency, hover), round(RATE / COMMANDS)
+    seconds = seconds if steps is None else steps.seconds
+    progress = ManoeuvreProgress.begin(WIDE, plant.state.position, 0.0)
     states, rotors, commands, trim = [], [], [], 0.0
     for k in range(round(seconds * RATE)):
         now, then = k / RATE, (k + 1) / RATE
@@ -86,10 +102,13 @@ def fly_excitation(
             plant.disturb(np.zeros(3), np.full(4, 1 - sag * now / seconds))
         if k % ticks == 0:
             motion = PlantMotion(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
-            found = wanted(steer, motion, (*lines(now, speed), 0.0))
-            rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
-            trim = trimmed(trim, lines(now, speed)[2] - state.velocity[2], 1 / COMMANDS, LIFT, WEAKEST)
-            sent = limited(believed, max(float(found.thrust) + thrust + trim, 0.0), found.rate + Vec3(*rates))
+            if steps is not None:
+                progress, sent = excite(steer, WIDE, steps, progress, now, motion)
+            else:
+                found = wanted(steer, motion, (*lines(now, speed), 0.0))
+                rates, thrust = doublets(now) if pulses else (np.zeros(3), 0.0)
+                trim = trimmed(trim, lines(now, speed)[2] - state.velocity[2], 1 / COMMANDS, LIFT, WEAKEST)
+                sent = limited(believed, max(float(found.thrust) + thrust + trim, 0.0), found.rate + Vec3(*rates))
             command = np.array([sent.thrust, sent.rate.x, sent.rate.y, sent.rate.z])
             commands.append((now, command))
             delay = delay.send(command, now)

@@ -24,7 +24,8 @@ LARGEST = 0.7
 """Relative standard deviation above which a value is too uncertain to be drawn."""
 TOGETHER = {"thrust_map": ("rotor_thrust_max",)}
 """Fields whose entries are all multiplied by one common factor, and the other fields that this factor multiplies."""
-ADDED = ("latency",)
+LATENCY = "latency"
+ADDED = (LATENCY, "centre_of_mass", "inertia_products")
 """Fields whose deviation is added, in their own unit. For all other fields the deviation is the logarithm of a
 factor."""
 
@@ -66,7 +67,7 @@ class Entry:
 class Posterior:
     """The distribution of a vehicle about the values of its file.
 
-    It is normal in the logarithms of the values, and for the latency in seconds.
+    It is normal in the logarithms of the values, and in the values themselves of the fields `ADDED`.
     """
 
     entries: tuple[Entry, ...]
@@ -77,7 +78,7 @@ class Posterior:
     @property
     def latency(self) -> int | None:
         """Index of the entry of the latency. None: the file does not give its uncertainty."""
-        return next((i for i, entry in enumerate(self.entries) if entry.field in ADDED), None)
+        return next((i for i, entry in enumerate(self.entries) if entry.field == LATENCY), None)
 
     @property
     def latency_sigma(self) -> Any:
@@ -86,7 +87,7 @@ class Posterior:
 
     def without_latency(self) -> "Posterior":
         """The distribution of all other entries."""
-        kept = [i for i, entry in enumerate(self.entries) if entry.field not in ADDED]
+        kept = [i for i, entry in enumerate(self.entries) if entry.field != LATENCY]
         return Posterior(tuple(self.entries[i] for i in kept), self.root[kept])
 
     @property
@@ -102,7 +103,7 @@ class Posterior:
 
     @property
     def sigma(self) -> dict[str, float]:
-        """Standard deviations by the name of the entry: relative, but for the latency in s."""
+        """Standard deviations by the name of the entry: relative, but of `ADDED` in the field's unit."""
         return {e.name: float(np.linalg.norm(row)) for e, row in zip(self.entries, self.root, strict=True)}
 
     def deviation(self, normal: Any) -> Any:
@@ -118,7 +119,7 @@ class Posterior:
         """
         drawn: dict[str, list[Any]] = {}
         for i, entry in enumerate(self.entries):
-            if entry.field not in ADDED:
+            if entry.field != LATENCY:
                 drawn.setdefault(entry.field, []).append((entry.index, deviation[:, i]))
         out: dict[str, Any] = {}
         for field, moved in drawn.items():
@@ -130,8 +131,8 @@ class Posterior:
                     out[name] = library.exp(first).reshape(-1, *(1,) * np.ndim(own)) * own
             else:
                 by, still = dict(moved), 0 * first
-                logs = [by.get(i, still) for i in range(np.shape(base)[-1])]
-                out[field] = library.exp(library.stack(logs, axis=-1)) * base
+                away = library.stack([by.get(i, still) for i in range(np.shape(base)[-1])], axis=-1)
+                out[field] = base + away if field in ADDED else library.exp(away) * base
         return out
 
 

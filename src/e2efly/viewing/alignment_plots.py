@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from e2efly.alignment.alignment import LEAD_S, Alignment, clearest
-from e2efly.alignment.replay import SIGNALS, Stretches, replay, stretches, thrust_is_told
+from e2efly.alignment.replay import SIGNALS, Stretches, stretches, thrust_is_told
 from e2efly.alignment.windows import REACH, STEP
 from e2efly.config.drawing import INK
 from e2efly.logs.recording import Record
@@ -39,8 +39,7 @@ def plot_alignment(folder: Path, alignment: Alignment, records: Sequence[Record]
 
 def both(alignment: Alignment, flown: Stretches) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Replays with the vehicle of the file and with the aligned vehicle."""
-    before, found = alignment.model, alignment.found
-    return replay(before, np.zeros(len(before.names)), flown), replay(found.model, found.p, flown)
+    return alignment.replayed(flown, aligned=False), alignment.replayed(flown, aligned=True)
 
 
 def plot_steps(path: Path, alignment: Alignment, record: Record) -> None:

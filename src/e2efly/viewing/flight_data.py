@@ -162,7 +162,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogCloc
         "speed_max_m_s": _largest(speed),
         "tilt_max_rad": _largest(tilt(motion.numbers("quaternion", 4))),
         "odometry_age_s": _spread(motion.numbers("age")),
-        "rate_response": {axis: _response(r) for axis, r in found.items()},
+        "rate_response": {axis: response_numbers(r) for axis, r in found.items()},
         "align": align_command(log, found),
         "loop": {
             "rounds": len(timing),
@@ -198,7 +198,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogCloc
             "correlation": alignment.correlation,
             "overlap_s": alignment.overlap,
             "clock_drift": alignment.drift,
-            "rate_response": {axis: _response(r) for axis, r in blackbox_responses(blackbox).items()},
+            "rate_response": {axis: response_numbers(r) for axis, r in blackbox_responses(blackbox).items()},
         }
     return finite(table)
 
@@ -213,7 +213,8 @@ def _errors(log: FlightLog, modes: list[Interval]) -> dict[str, dict[str, float]
     return {mode: {"rms": float(np.sqrt(np.mean(e**2))), "max": float(e.max())} for mode, e in joined.items() if len(e)}
 
 
-def _response(r: StepResponse) -> dict[str, Any]:
+def response_numbers(r: StepResponse) -> dict[str, Any]:
+    """A step response in numbers. None where they are not to be believed."""
     numbers = {"delay_s": r.delay, "rise_63_s": r.rise, "overshoot": r.overshoot, "gain": r.gain}
     believed = {key: value if not r.reason else None for key, value in numbers.items()}
     return {**believed, "excitation_rad_s": r.excitation, "explained": r.explained, "reason": r.reason or None}

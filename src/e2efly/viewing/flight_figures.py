@@ -2,12 +2,17 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from e2efly.logs.blackbox import Blackbox, LogClock, align, read_blackbox
 from e2efly.logs.flight_log import FlightLog
 from e2efly.viewing import flight_health as health
 from e2efly.viewing import flight_report as report
 from e2efly.viewing.flight_data import blackbox_responses, gyro, responses
+from e2efly.viewing.pid_analysis import PidAnalysis, analysis_of, pid_analysis, pid_numbers
+from e2efly.viewing.pid_plot import plot_pid
 
 
 def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, LogClock] | None = None) -> list[Path]:
@@ -30,7 +35,36 @@ def draw(log: FlightLog, out: Path, laid: tuple[Blackbox, LogClock] | None = Non
     if laid:
         paths.append(out / "blackbox.png")
         health.plot_blackbox(log, *laid, paths[-1])
+    if isinstance(found := analysis_of(log, laid[0] if laid else None), PidAnalysis):
+        paths.append(out / "pid.png")
+        plot_pid(found, paths[-1], f"blackbox of {log.path.name}")
     return paths
+
+
+def draw_blackbox(path: Path, sessions: list[Blackbox], out: Path) -> list[dict[str, Any]]:
+    """Draw the analysis of each session of a blackbox log into a folder, as pid_N.png. Returns the numbers of each, or
+    why there are none.
+
+    Raises:
+        ValueError: when no session can be analysed, with the reasons.
+    """
+    rows: list[dict[str, Any]] = []
+    found: list[tuple[int, PidAnalysis]] = []
+    for box in sessions:
+        row: dict[str, Any] = {"session": box.session, "duration_s": float(np.ptp(box.time)), "notes": list(box.notes)}
+        try:
+            analysis = pid_analysis(box, f"{path}, session {box.session}")
+        except ValueError as error:
+            rows.append(row | {"reason": str(error)})
+            continue
+        found.append((box.session, analysis))
+        rows.append(row | pid_numbers(analysis))
+    if not found:
+        raise ValueError("; ".join(row["reason"] for row in rows))
+    out.mkdir(parents=True, exist_ok=True)
+    for session, analysis in found:
+        plot_pid(analysis, out / f"pid_{session}.png", f"{path.name}, session {session}")
+    return rows
 
 
 def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, LogClock]:
@@ -42,7 +76,7 @@ def laid_over(log: FlightLog, path: Path) -> tuple[Blackbox, LogClock]:
     time, rate, _ = gyro(log)
     found: list[tuple[Blackbox, LogClock]] = []
     reasons: list[str] = []
-    for session in read_blackbox(path):
+    for session in read_blackbox(path, tuning=True):
         try:
             found.append((session, align(time, rate, session)))
         except ValueError as error:

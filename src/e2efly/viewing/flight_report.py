@@ -149,26 +149,30 @@ def plot_response(by_source: dict[str, dict[str, StepResponse]], path: str | Pat
     with figure(path, "Rate loop: response to a step", 4.3 + 0.2 * len(by_source), notes) as fig:
         axes = fig.subplots(1, 3, sharey=True)
         for i, (ax, axis) in enumerate(zip(axes, AXES, strict=True)):
-            ax.axhline(1.0, color=GREY, linewidth=0.9)
-            texts = []
-            for (source, found), style in zip(by_source.items(), ("-", (0, (5, 1.5))), strict=False):
-                r = found[axis]
-                color = XYZ[i] if style == "-" else INK
-                texts.append(f"{source}: {_told(r)}")
-                if len(r.time):
-                    shown = (0, (1, 1.5)) if r.reason else style
-                    ax.plot(1e3 * r.time, r.response, color=color, linestyle=shown, label=source)
-                if len(r.time) and not r.reason:
-                    ends = np.array([(r.delay, 0.1 * r.gain), (r.rise, (1 - np.exp(-1)) * r.gain)]).T
-                    ax.plot(1e3 * ends[0], ends[1], "o", color=color, markersize=5, markeredgecolor="white")
-            ax.set_title("\n".join([axis, *texts]), fontsize=9, linespacing=1.4)
-            ax.set_xlabel("time since the step (ms)")
-            ax.set_xlim(0, 500)
-            if len(by_source) > 1 and any(len(f[axis].time) for f in by_source.values()):
-                ax.legend(loc="lower right")
+            draw_response(ax, {source: found[axis] for source, found in by_source.items()}, axis, i)
         axes[0].set_ylabel("rate / rate commanded")
         low, high = axes[0].get_ylim()
         axes[0].set_ylim(max(low, -0.5), min(max(high, 1.2), 2.2))
+
+
+def draw_response(ax: Axes, by_source: dict[str, StepResponse], axis: str, color: int) -> None:
+    """Draw the step responses of one axis into axes, in its colour, and tell their numbers in the title."""
+    ax.axhline(1.0, color=GREY, linewidth=0.9)
+    texts = []
+    for (source, r), style in zip(by_source.items(), ("-", (0, (5, 1.5))), strict=False):
+        painted = XYZ[color] if style == "-" else INK
+        texts.append(f"{source}: {_told(r)}")
+        if len(r.time):
+            shown = (0, (1, 1.5)) if r.reason else style
+            ax.plot(1e3 * r.time, r.response, color=painted, linestyle=shown, label=source)
+        if len(r.time) and not r.reason:
+            ends = np.array([(r.delay, 0.1 * r.gain), (r.rise, (1 - np.exp(-1)) * r.gain)]).T
+            ax.plot(1e3 * ends[0], ends[1], "o", color=painted, markersize=5, markeredgecolor="white")
+    ax.set_title("\n".join([axis, *texts]), fontsize=9, linespacing=1.4)
+    ax.set_xlabel("time since the step (ms)")
+    ax.set_xlim(0, 500)
+    if len(by_source) > 1 and any(len(r.time) for r in by_source.values()):
+        ax.legend(loc="lower right")
 
 
 def _told(r: StepResponse) -> str:

@@ -44,7 +44,7 @@ def _plot_parameters(path: Path, base: Vehicle, fused: Mapping[str, Estimate]) -
             np.atleast_1d(np.asarray(x, float)).ravel() for x in (getattr(base, name), e.value, e.sigma)
         )
         for i in range(own.size):
-            if np.isfinite(value[i]) and own[i] != 0:
+            if np.isfinite(value[i] / own[i] if own[i] else np.nan):
                 label = name if own.size == 1 else f"{name}[{i}]"
                 rows.append((label.replace("_", " "), value[i] / own[i], 1.645 * sigma[i] / abs(own[i])))
     notes = ["over the value of the file that it began from, with the interval that holds 90 %"]
@@ -119,7 +119,7 @@ def _plot_fit(path: Path, each: Found, outside: Prediction) -> None:
 
 def _plot_residuals(path: Path, each: Found, outside: Prediction) -> None:
     windows = each.windows.some(each.held_out)
-    names = [name for name in outside.before if name != "quaternion"]
+    names = [name for name in outside.before if name != "quaternion" and name in each.fit.noise]
     notes = ["measured less simulated, over the spread that the fit gives each sensor; line: a normal distribution"]
     with figure(path, "What is left", 0.9 + 2.1 * -(-len(names) // 3), notes) as fig:
         bins = np.linspace(-5, 5, 61)

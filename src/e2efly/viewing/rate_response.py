@@ -23,6 +23,11 @@ EXPLAINED = 0.7
 """Fraction of the response's variance that the estimate must explain to be valid."""
 SETTLES = (0.6, 1.5)
 """Range in which a valid estimate must settle. A loop with an integrator ends at 1."""
+SLOWEST = 25.0
+"""Lowest sampling rate of the response that an estimate needs, Hz."""
+GAP, LOST = 0.1, 0.05
+"""Length from which a time without a sample of the response is a gap, s, and the largest share of the time that may be
+in gaps."""
 _GRID = (0.001, 0.02)  # s: finest and coarsest step in time
 
 
@@ -69,6 +74,8 @@ def step_response(
     x, y, step = _aligned(command_time, command, response_time, response, intervals or [(-np.inf, np.inf)])
     if len(x) * step < 4 * WINDOW:
         return _nothing(f"less than {4 * WINDOW:g} s of commands and response together", 0.0)
+    if reason := _unusable(response_time[np.isfinite(response)], intervals or [(-np.inf, np.inf)]):
+        return _nothing(reason, 0.0)
     excitation = float(np.std(x - _smooth(x, round(1.0 / step))))
     if excitation < EXCITATION:
         return _nothing(f"not enough excitation: {excitation:.2g} rad/s rms, needed {EXCITATION:g}", excitation)
@@ -87,6 +94,17 @@ def step_response(
     delay, rise = (_reaches(time, curve, part * gain) for part in (0.1, 1 - np.exp(-1)))
     overshoot = max(float(curve.max() / gain) - 1, 0.0) if gain > 0 else float("nan")
     return StepResponse(time, curve, delay, rise, overshoot, gain, excitation, explained, reason)
+
+
+def _unusable(time: np.ndarray, intervals: list[tuple[float, float]]) -> str:
+    """Why the samples of a response do not show it. Empty: they do."""
+    pauses = np.diff(time)[_within(time[:-1], intervals)]
+    rate = 1 / float(np.median(pauses))
+    if rate < SLOWEST:
+        return f"too slow: {rate:.0f} samples a second, needed {SLOWEST:g}"
+    gaps = pauses[pauses > GAP]
+    lost = float(gaps.sum() / pauses.sum())
+    return f"gaps: {lost:.0%} of the time without samples, accepted up to {LOST:.0%}" if lost > LOST else ""
 
 
 def _nothing(reason: str, excitation: float) -> StepResponse:

@@ -12,6 +12,7 @@ DRAWS = 500
 """Number of vehicles that are shown."""
 PAIRS = 3
 """Number of the most correlated pairs of parameters, each shown in its own panel."""
+_SCALES = {"latency": (1e3, "ms"), "centre_of_mass": (1e3, "mm"), "inertia_products": (1e6, "kg mm²")}
 WITHIN = np.sqrt(-2 * np.log(0.1))
 """Number of standard deviations of a two-dimensional normal distribution that contain 90 % of it."""
 
@@ -73,8 +74,8 @@ def _label(name: str) -> str:
 
 
 def _scale(name: str) -> tuple[float, str]:
-    """Factor and unit in which a deviation is shown: milliseconds for the delay, per cent for everything else."""
-    return (1e3, "ms") if name == "latency" else (100.0, "%")
+    """Factor and unit in which a deviation is shown: per cent, unless it is added."""
+    return _SCALES.get(name.split("[")[0], (100.0, "%"))
 
 
 def _size(name: str, sigma: float) -> str:
