@@ -23,7 +23,7 @@ from e2efly.vehicles.family import load_family
 DOCS = Path(__file__).parent
 TASKS = {
     "hover": "Fly to a point and stay there.",
-    "hover_rotors": "Fly to a point and stay there, by a hundred commands a second to each rotor ([any vehicle](any-vehicle.md)).",
+    "hover_rotors": "Fly to a point and stay there, by commands to each rotor ([any vehicle](any-vehicle.md)).",
     "land": "Land on a point of the ground, gently.",
     "track": "Follow a moving reference.",
     "race": "Fly a lap through gates.",
