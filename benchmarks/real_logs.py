@@ -17,8 +17,8 @@ import numpy as np
 from common import arguments, table, write
 
 from e2efly.alignment.checks import checked
-from e2efly.alignment.forecast import HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, forecast, typical
 from e2efly.alignment.identification import Found, identify, typical_volts
+from e2efly.alignment.open_loop import HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, forecast, typical
 from e2efly.alignment.prediction import judged
 from e2efly.alignment.vehicle_file import merged
 from e2efly.alignment.windows import STEP
@@ -40,7 +40,7 @@ CORRUPT = "B2_circle_medium_rep3"
 AHEAD = (0.5, 1.0, 2.0)
 """How far ahead positions are foretold, s."""
 TUNED = ("circle", "figure8", "helix")
-"""The trajectories that were looked at while the prediction was made better."""
+"""The trajectories by which the prediction was tuned."""
 
 
 def crazyflie(folder: Path, vehicle: Vehicle) -> list[dict[str, Any]]:

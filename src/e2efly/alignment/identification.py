@@ -420,8 +420,8 @@ def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
 
 
 def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: of two vague ones, only the
-    one is refused that the file has as zero, or the less certain of two zeros.
+    """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: if both are vague, only the
+    one that the file has as zero is refused, or the less certain of two zeros.
     """
     vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
     for axis in range(3):

@@ -16,7 +16,7 @@ from e2efly.config.storage import make_folder, write_json
 from e2efly.vehicles.loading import load_vehicle
 
 if TYPE_CHECKING:
-    from e2efly.alignment.forecast import Forecast
+    from e2efly.alignment.open_loop import Forecast
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ def run(options: Predict) -> int:
     Raises:
         ValueError: naming the log or the option, what is wrong with it and what is accepted. Nothing is written then.
     """
-    from e2efly.alignment.forecast import forecast
     from e2efly.alignment.identification import driver_of, typical_volts
     from e2efly.alignment.model import NUISANCES, Model
+    from e2efly.alignment.open_loop import forecast
     from e2efly.simulation.device import prepare
     from e2efly.viewing.forecast_plot import plot_forecasts
 
@@ -108,7 +108,7 @@ def together(found: "Sequence[Forecast]") -> tuple[tuple[float, ...], Errors]:
 
 
 def _say(each: "Forecast", console: Terminal) -> None:
-    from e2efly.alignment.forecast import OWN_S
+    from e2efly.alignment.open_loop import OWN_S
 
     how = f"driven by {each.driver.replace('_', ' ')}"
     if each.own:
@@ -124,7 +124,7 @@ def _say(each: "Forecast", console: Terminal) -> None:
 
 
 def _table(ahead: Sequence[float], errors: Errors) -> Table:
-    from e2efly.alignment.forecast import STREAMS
+    from e2efly.alignment.open_loop import STREAMS
 
     table = headed("mean error", "predicted by", *(f"{t:g} s" for t in ahead))
     for stream, sizes in errors.items():
@@ -134,7 +134,7 @@ def _table(ahead: Sequence[float], errors: Errors) -> Table:
 
 
 def _report(each: "Forecast") -> dict[str, Any]:
-    from e2efly.alignment.forecast import OWN_S, STREAMS
+    from e2efly.alignment.open_loop import OWN_S, STREAMS
 
     return {
         "log": str(each.record.path),

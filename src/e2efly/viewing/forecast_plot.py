@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.alignment.forecast import HOLD, HOVER, OWN_VEHICLE, STREAMS, VEHICLE
+from e2efly.alignment.open_loop import HOLD, HOVER, OWN_VEHICLE, STREAMS, VEHICLE
 from e2efly.viewing.style import BLUE, GREEN, GREY, VERMILLION, figure, say
 
 COLOURS = {HOLD: GREY, HOVER: VERMILLION, VEHICLE: BLUE, OWN_VEHICLE: GREEN}

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from e2efly.alignment.forecast import AHEAD, HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, Forecast, forecast, typical
 from e2efly.alignment.model import LOST, NUISANCES, Model
+from e2efly.alignment.open_loop import AHEAD, HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, Forecast, forecast, typical
 from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.recording import Record, Stream
