@@ -6,8 +6,8 @@ The paper's figure of the step-response alignment, with the firmware in the plac
 rigid body of the vehicle's file, with a quicker tune than the file says (`tests.validation.steps`),
 `e2efly.alignment.alignment` fits delay and rate loop to the log, and docs/step_response.png shows the mean of four
 steps of each command. `--log` keeps the flight as CSV.
-The zoo's race through the same firmware is aligned, too, with the log that the bridge keeps, and flown by the
-simulator from the same start (docs/closed_loop.png, the paper's figure of the policy's response).
+The paper's figure of the policy's response after it is docs/closed_loop.png: `e2efly fly steps` and the alignment with
+its log, then the zoo's race through the same firmware and, from the same start, in the simulator.
 """
 
 import dataclasses
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from common import arguments, table, write
 from PIL import Image
+from tests.validation.firmware_excitation import fly_excited
 from tests.validation.steps import HOLD_S, QUICKER, SetpointStep, fly_steps
 
 from e2efly.alignment.alignment import LEAD_S, Alignment, align
@@ -27,6 +28,7 @@ from e2efly.alignment.checks import checked
 from e2efly.alignment.replay import SIGNALS, stretches
 from e2efly.alignment.vehicle_file import merged
 from e2efly.commands.align import pose_delay_of
+from e2efly.flight.excitation import StepsOptions
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.readers import read_flights
@@ -37,6 +39,7 @@ from e2efly.policy.zoo import policy_file
 from e2efly.simulation.device import prepare
 from e2efly.tasks.route import usual_route
 from e2efly.validation import firmware_program
+from e2efly.validation.bridge_session import rehearsal_settings
 from e2efly.validation.closed_loop import SIGNALS as COMPARED
 from e2efly.validation.closed_loop import closed_loop, policy_of
 from e2efly.validation.rehearsal import LINK_S, rehearse
@@ -78,30 +81,32 @@ def reached(time: np.ndarray, share: np.ndarray, level: float) -> float:
 
 
 def race(name: str) -> dict[str, Any]:
-    """The zoo's race through the firmware, aligned with the bridge's log: most of it at twice hover's thrust. And the
-    simulator's race by the same policy from the same start, before and after.
+    """VIS-R's file, aligned by `e2efly fly steps` through the firmware; then the zoo's race through the same firmware,
+    and the simulator's race by the same policy from the same start, with the file and with the aligned vehicle.
     """
     vehicle, file = load_vehicle(name), policy_file("race", name)
-    policy = load_policy(file)
+    policy, firmware = load_policy(file), firmware_program.chosen()
     usual = usual_route(policy.contract)
     route = dataclasses.replace(usual, outside=True, **usual.whole)
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "race.mcap"
+        steps, path = Path(folder) / "steps.mcap", Path(folder) / "race.mcap"
+        with Telemetry(steps) as log:
+            fly_excited(firmware, vehicle, vehicle, rehearsal_settings(1.5), options=StepsOptions(), log=log)
+        records = checked(read_flights(steps), vehicle)
+        found = align(vehicle, records, pose_delay_of(None, records)[0])
+        aligned = merged(vehicle, {e.name: e for e in found.estimates})
         with Telemetry(path, queue_size=200_000) as log:
-            flown = rehearse(firmware_program.chosen(), policy, vehicle, log=log, route=route)
+            flown = rehearse(firmware, policy, vehicle, log=log, route=route)
             settings = json.dumps({"policy": str(file), "goal": vars(route)}, default=str)
             log.record("meta", monotonic(), {"contract": policy.contract.to_json(), "settings": settings})
-        records = checked(read_flights(path), vehicle)
-        pose_delay, _, _ = pose_delay_of(None, records)
-        found = align(vehicle, records, pose_delay)
-        aligned = merged(vehicle, {e.name: e for e in found.estimates})
-        told = read_log(path)
+        (record,), told = checked(read_flights(path), vehicle), read_log(path)
         flew = policy_of(told)
         assert flew is not None
-        loop = closed_loop(told, records[0], *flew, {"before": vehicle, "aligned": aligned}, pose_delay)
+        vehicles = {"before": vehicle, "aligned": aligned}
+        loop = closed_loop(told, record, *flew, vehicles, pose_delay_of(None, [record])[0])
     plot_closed_loop(LOOP, loop)
     return {
-        "complete": flown.complete, **report(vehicle, found),
+        "complete": flown.complete, "steps": report(vehicle, found),
         "closed_loop": {
             "compared_s": loop.compared,
             "rms_difference": {

@@ -28,6 +28,9 @@ EARLY_S = 0.025
 motors and the rate loop of its file."""
 AXES = {"rate_gain_x": "roll", "rate_gain_y": "pitch", "rate_gain_z": "yaw"}
 FLY = "steps or doublets of {} rate, 2 rad/s and more, 0.2 s and longer each, three of them or more"
+WORSE = 1.5
+"""By how much the error of the rates may rise where the fit did not look. A flight without steps may show gains that
+no other part of it has."""
 SHOWN_S = 0.8
 """Length of the sections that are shown, s."""
 LEAD_S = 0.12
@@ -96,11 +99,17 @@ def align(
     """
     links = [late for late in map(_link, records) if late is not None]
     found = _aligned(vehicle, records, pose_delay, links, told)
-    if not links or _turning(found.after) <= _turning(found.before):
-        return found
-    # a rate loop that is unlike the model: the delay that fits best hides the difference
-    other = _aligned(vehicle, records, pose_delay, [], told)
-    return min(found, other, key=lambda each: _turning(each.after))
+    if links and _turning(found.after) > _turning(found.before):
+        # a rate loop that is unlike the model: the delay that fits best hides the difference
+        other = _aligned(vehicle, records, pose_delay, [], told)
+        found = min(found, other, key=lambda each: _turning(each.after))
+    if _turning(found.after) > WORSE * _turning(found.before):
+        raise ValueError(
+            f"{', '.join(str(r.path) for r in records)}: nothing can be aligned: where the fit did not look, the error "
+            f"of roll and pitch rate together rises from {_turning(found.before):.3g} to {_turning(found.after):.3g} "
+            f"rad/s; fly {FLY.format('body')} (e2efly fly steps)"
+        )
+    return found
 
 
 def _turning(errors: dict[str, float]) -> float:
