@@ -30,7 +30,8 @@ from hidden_bodies import HiddenPlant, drawn, parameters, truths
 from tests.validation.firmware_excitation import fly_excited
 
 from e2efly.alignment.checks import checked
-from e2efly.alignment.identification import Found, identify, whole_covariance
+from e2efly.alignment.found import Found, whole_covariance
+from e2efly.alignment.identification import identify
 from e2efly.alignment.model import value_of
 from e2efly.flight.settings import Fence
 from e2efly.logs.blackbox_merge import setpoint_delay, with_blackboxes

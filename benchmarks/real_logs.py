@@ -17,7 +17,8 @@ import numpy as np
 from common import arguments, table, write
 
 from e2efly.alignment.checks import checked
-from e2efly.alignment.identification import Found, identify, typical_volts
+from e2efly.alignment.found import Found
+from e2efly.alignment.identification import identify, typical_volts
 from e2efly.alignment.open_loop import HOLD, HOVER, OWN_S, OWN_VEHICLE, VEHICLE, forecast, typical
 from e2efly.alignment.prediction import judged
 from e2efly.alignment.vehicle_file import merged

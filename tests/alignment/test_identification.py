@@ -8,7 +8,8 @@ import pytest
 
 from e2efly.alignment.correlation import OVER_MASS, correlation
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found, identify
+from e2efly.alignment.found import Found
+from e2efly.alignment.identification import identify
 from e2efly.alignment.vehicle_file import merged
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.recording import Record

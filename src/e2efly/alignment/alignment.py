@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found, Refusal, identify
+from e2efly.alignment.found import Found, Refusal
+from e2efly.alignment.identification import identify
 from e2efly.alignment.model import Model
 from e2efly.alignment.replay import Stretches, asking, replay, rms, stretches, thrust_is_told, wrong
 from e2efly.alignment.thrust_response import FLY as THRUST_STEPS

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found, relative_sigma
+from e2efly.alignment.found import Found, relative_sigma
 from e2efly.alignment.model import Unknown
 from e2efly.vehicles.posterior import ADDED, TOGETHER, Entry
 

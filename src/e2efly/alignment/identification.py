@@ -2,24 +2,20 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
+from e2efly.alignment.found import Found, Part, estimates_of, is_vague, refusals_of, whole_covariance
 from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
 from e2efly.alignment.model import (
     FROM_ZERO,
-    NUISANCES,
     POSE_DELAY,
     UNKNOWNS,
     Model,
-    Unknown,
     from_zero,
-    value_of,
     vehicle_of,
 )
 from e2efly.alignment.response import RESPONSE, responded
@@ -30,11 +26,6 @@ from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import MOTORS, Record
 from e2efly.vehicles.vehicle import Vehicle
 
-SHOWN = 0.5
-"""If the standard deviation is above this fraction of the prior's, the flights say nothing about an unknown."""
-EXACT = {"latency": 0.02, "drag": 0.5}
-"""Standard deviation above which an unknown is refused, s or relative. `EXACT_ELSE` applies to all others."""
-EXACT_ELSE = 0.15
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of the results between models that differ in properties that no log shows: how often the flight controller
 runs, and how the accelerometer is filtered. In s for the delay, else relative."""
@@ -57,97 +48,10 @@ LEAST = 1.5
 refused by its standard deviation."""
 TORQUES = 200.0
 """Sampling rate of motor outputs and rotor speeds from which on they show the torques on the body, Hz."""
-SURE = 3.0
-"""Number of standard deviations from which on an effect that the vehicle file does not have counts as shown."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
 values of the file; beyond it, the fit is repeated. Those standard deviations hold for known refused ones. `REFITS`: the
 largest number of such repetitions."""
-ABOVE_ZERO = 2.0
-"""Standard deviations by which an unknown that the file has as zero must be above it to be taken from the flights."""
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """An unknown that cannot be found from these flights."""
-
-    unknown: Unknown
-    sigma: float
-    """Standard deviation after the fit, s or relative."""
-    impossible: bool = False
-    """Whether the fitted value is impossible for a rigid body."""
-    added: float = 0.0
-    """If the file has zero, the unit of `sigma`, in the unit of the file's field."""
-
-    def __str__(self) -> str:
-        if self.impossible:
-            return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
-        if self.added:
-            off = f"{self.sigma * self.added:.2g} {Vehicle.__dataclass_fields__[self.unknown.field].metadata['unit']}"
-            return (
-                f"{self.unknown.name} stays 0, as in the file: the flights show it to +- {off}; fly: {self.unknown.fly}"
-            )
-        unit = " s" if self.unknown.field == "latency" else ""
-        how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
-        return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
-
-
-@dataclass(frozen=True)
-class Part:
-    """Unknowns that were fitted together."""
-
-    base: Vehicle
-    """The vehicle at which all of them are zero."""
-    unknowns: tuple[Unknown, ...]
-    p: np.ndarray
-    """(u,) their values."""
-    sigma: np.ndarray
-    """(u,) their standard deviations."""
-    covariance: np.ndarray
-    """(u, u) whose correlations hold."""
-    noise: dict[str, float]
-    """Spread of each sensor about the model."""
-
-
-@dataclass(frozen=True)
-class Found:
-    """The result of the identification from flights."""
-
-    model: Model
-    fit: Fit
-    windows: Windows
-    """All windows."""
-    held_out: np.ndarray
-    """(n,) which of the windows the fit did not see."""
-    estimates: list[Estimate]
-    refusals: list[Refusal]
-    p: np.ndarray
-    """(u,) values of the unknowns: those of the fit, given that refused unknowns have the values of the file."""
-    sigma: np.ndarray
-    """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
-    structures: dict[str, np.ndarray]
-    """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
-    response: Part | None = None
-    """What the rotor speeds show of lag, delay and rate loop, if they were measured."""
-    misfits: tuple[Misfit, ...] = ()
-    """What the fit leaves over, by sensor."""
-
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """What was fitted, each part by itself."""
-        own = Part(self.model.base, self.model.unknowns, self.p, self.sigma, self.fit.covariance, self.fit.noise)
-        return (own,) if self.response is None else (own, self.response)
-
-
-def relative_sigma(part: Part) -> np.ndarray:
-    """Standard deviations of the unknowns, (u,), relative to the value where the file has zero, as elsewhere."""
-    return np.where(from_zero(part.base, part.unknowns) > 0, part.sigma / np.maximum(part.p, 1e-12), part.sigma)
-
-
-def whole_covariance(found: Fit, sigma: np.ndarray) -> np.ndarray:
-    """The covariance with these standard deviations and the correlations of the fit."""
-    spread = np.sqrt(np.diag(found.covariance))
-    return found.covariance / np.outer(spread, spread) * np.outer(sigma, sigma)
 
 
 def driver_of(records: Sequence[Record], step: bool = False) -> str:
@@ -259,7 +163,7 @@ def identify(
     refused = absent | impossible | _taken_back(model, found.p, sigma)
     p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
-        unclear = np.any(_is_vague(model.base, model.unknowns, found.p, sigma) & ~refused)
+        unclear = np.any(is_vague(model.base, model.unknowns, found.p, sigma) & ~refused)
         near = np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused])
         if not refused.any() or (near and not unclear):
             break
@@ -271,7 +175,7 @@ def identify(
         sigma = np.where(refused, sigma, sigmas(model, found, misfits(found, seen, records)))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
-        more = refused | impossible | _is_vague(model.base, model.unknowns, p, sigma)
+        more = refused | impossible | is_vague(model.base, model.unknowns, p, sigma)
         if np.all(more == refused):
             break
         refused = more
@@ -280,9 +184,9 @@ def identify(
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
-    refusals = _refusals(model.base, model.unknowns, sigma, refused & ~absent, impossible)
+    refusals = refusals_of(model.base, model.unknowns, sigma, refused & ~absent, impossible)
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
-    estimates = _estimates(model.base, model.unknowns, p, sigma, refused, source)
+    estimates = estimates_of(model.base, model.unknowns, p, sigma, refused, source)
     left, answer = misfits(found, seen, records), None
     late = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
     answered = None if late is None else (float(model.base.latency) + float(p[late]), float(sigma[late]))
@@ -292,9 +196,9 @@ def identify(
         answer, more = _answer(model, records, plain)
         left += more
         held = np.array([plain and unknown.absent(vehicle) for unknown in RESPONSE])
-        vague = _is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held
-        refusals += _refusals(model.base, RESPONSE, answer.sigma, vague)
-        estimates += _estimates(model.base, RESPONSE, answer.p, answer.sigma, vague | held, source)
+        vague = is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held
+        refusals += refusals_of(model.base, RESPONSE, answer.sigma, vague)
+        estimates += estimates_of(model.base, RESPONSE, answer.p, answer.sigma, vague | held, source)
         answered = next(((float(e.value), float(e.sigma)) for e in estimates if e.name == "latency"), None)
     if not step:  # with `step`, the fitted delay from command to response is the result
         estimates = [e for e in estimates if e.name != "latency"]
@@ -386,27 +290,6 @@ def _latency(
     return [Estimate("latency", np.array(total), np.array(off), source)]
 
 
-def _refusals(
-    base: Vehicle, unknowns: Sequence[Unknown], sigma: np.ndarray, refused: np.ndarray, impossible: Any = False
-) -> list[Refusal]:
-    """The refusals of those unknowns that are refused, (u,)."""
-    units, impossible = from_zero(base, unknowns), np.broadcast_to(impossible, refused.shape)
-    return [
-        Refusal(unknowns[i], float(sigma[i]), bool(impossible[i]), float(units[i]))
-        for i in map(int, np.flatnonzero(refused))
-        if unknowns[i].field
-    ]
-
-
-def _is_vague(base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """About which unknowns, (u,), the flights say too little."""
-    limits = []
-    for u in unknowns:
-        exact = next((v for name, v in EXACT.items() if u.field.startswith(name)), np.inf if u.added else EXACT_ELSE)
-        limits.append(min(exact, SHOWN * u.prior))
-    return (sigma > limits) | ((from_zero(base, unknowns) > 0) & (p < ABOVE_ZERO * sigma))
-
-
 def _impossible(model: Model, p: np.ndarray) -> np.ndarray:
     """Which unknown, (u,), is a moment of inertia that is too large: the three moments must satisfy the triangle
     inequality.
@@ -423,7 +306,7 @@ def _taken_back(model: Model, p: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Which unknowns, (u,), are refused at first. Two drags of one axis explain each other: if both are vague, only the
     one that the file has as zero is refused, or the less certain of two zeros.
     """
-    vague, zero = _is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
+    vague, zero = is_vague(model.base, model.unknowns, p, sigma), from_zero(model.base, model.unknowns) > 0
     for axis in range(3):
         both = [i for i, u in enumerate(model.unknowns) if u.field in FROM_ZERO and u.entries == (axis,)]
         if len(both) == 2 and vague[both].all() and zero[both].any():
@@ -456,36 +339,3 @@ def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
     scale = np.where(from_zero(model.base, model.unknowns) > 0, size, 1.0)  # relative, of what is no logarithm too
     off = np.hypot(noise, scale * [structure.get(u.field, 0.0) for u in model.unknowns])
     return widened(left, off, np.array([u.prior for u in model.unknowns]))
-
-
-def _estimates(
-    base: Vehicle, unknowns: Sequence[Unknown], p: np.ndarray, sigma: np.ndarray, refused: np.ndarray, source: str
-) -> list[Estimate]:
-    """The estimates by field of the vehicle. Fields that the flights do not determine are left to the file, and so are
-    effects that it does not have and that are not shown.
-    """
-    values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    shown = [u.field for u, x, off in zip(unknowns, p, sigma, strict=True) if abs(x) > SURE * off]
-    for unknown, x, off, vague, unit in zip(unknowns, p, sigma, refused, from_zero(base, unknowns), strict=True):
-        absent = unknown.field and getattr(base, unknown.field) is None
-        if vague or not unknown.field or (absent and unknown.added and unknown.field not in shown):
-            continue
-        own = np.asarray(value_of(base, unknown.field), float)
-        lacking = own if absent else np.full(own.shape, np.nan)
-        value, spread = values.setdefault(unknown.field, (lacking.copy(), np.full(own.shape, np.nan)))
-        at = list(unknown.entries) if unknown.entries else ...
-        if unknown.added:
-            value[at], spread[at] = own[at] + x, off
-        elif unit:
-            value[at], spread[at] = unit * x, unit * off
-        else:
-            value[at], spread[at] = own[at] * np.exp(x), np.abs(own[at]) * np.exp(x) * off
-        if unknown.field == "thrust_map":  # the largest thrust grows with the map
-            top = float(base.rotor_thrust_max) * np.exp(x)
-            values["rotor_thrust_max"] = np.array(top), np.array(top * off)
-    return [Estimate(name, value, spread, source) for name, (value, spread) in values.items()]
-
-
-def nuisances(found: Found) -> list[dict[str, float]]:
-    """The nuisance parameters of each flight, by name."""
-    return [dict(zip((name for name, _ in NUISANCES), map(float, q), strict=True)) for q in found.fit.q]

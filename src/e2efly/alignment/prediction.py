@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.alignment.identification import Found
+from e2efly.alignment.found import Found
 from e2efly.alignment.model import NUISANCES, START, Model, attitude_error, simulate
 from e2efly.alignment.shooting import measured_starts
 from e2efly.alignment.windows import STEP, Windows

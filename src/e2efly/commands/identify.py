@@ -21,7 +21,7 @@ from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate
-    from e2efly.alignment.identification import Found
+    from e2efly.alignment.found import Found
     from e2efly.alignment.prediction import Prediction
     from e2efly.logs.recording import Record
 
@@ -173,7 +173,7 @@ def _flown(vehicle: Vehicle, believed: Vehicle, records: "Sequence[Record]", ste
 
 def _left_over(found: "Found") -> list[str]:
     """What each flight had besides the vehicle, and what the fit leaves over, in words."""
-    from e2efly.alignment.identification import nuisances
+    from e2efly.alignment.found import nuisances
     from e2efly.alignment.model import UNITS
     from e2efly.logs.recording import KINDS
 
@@ -228,7 +228,7 @@ def _report(
     found: "dict[str, Found]",
     outside: "dict[str, Prediction]",
 ) -> dict[str, Any]:
-    from e2efly.alignment.identification import nuisances
+    from e2efly.alignment.found import nuisances
     from e2efly.alignment.windows import STEP
 
     def entry(e: "Estimate") -> dict[str, Any]:

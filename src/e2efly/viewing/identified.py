@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.identification import Found
+from e2efly.alignment.found import Found
 from e2efly.alignment.prediction import Prediction
 from e2efly.logs.recording import KINDS
 from e2efly.vehicles.vehicle import Vehicle
