@@ -112,10 +112,13 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ),
         (["eval", "nowhere.onnx"], "nowhere.onnx"),
         (["eval", "nowhere.onnx", "--episodes", "0"], "--episodes is 0; accepted: more than 0"),
-        (["export", "nowhere"], "unknown policy 'nowhere'; did you mean 'hover'? (there are: any/hover, any/land"),
+        (
+            ["export", "nowhere"],
+            "unknown policy 'nowhere'; did you mean 'hover'? (there are: any/hover, any/hover_rotors, any/land",
+        ),
         (
             ["render", "forst"],
-            "unknown scene or policy 'forst'; did you mean 'forest'? (there are: any/hover, any/land,",
+            "unknown scene or policy 'forst'; did you mean 'forest'? (there are: any/hover, any/hover_rotors,",
         ),
         (["render", "nowhere.toml"], "nowhere.toml: No such file or directory; accepted: the path of a .toml file"),
         (["render", "forest", "--width", "4"], "--width is 4; accepted: 8 to 4096 pixels"),

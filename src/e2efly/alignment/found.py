@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.misfit import Misfit
+from e2efly.alignment.misfit import LeftOver
 from e2efly.alignment.model import NUISANCES, Model, Unknown, from_zero, value_of
 from e2efly.alignment.shooting import Fit
 from e2efly.alignment.windows import Windows
@@ -50,7 +50,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Part:
+class FittedPart:
     """Unknowns that were fitted together."""
 
     base: Vehicle
@@ -84,19 +84,19 @@ class Found:
     """(u,) standard deviations of the unknowns, including the uncertainty of the model itself."""
     structures: dict[str, np.ndarray]
     """(u,) values of the unknowns found with models of another structure, by the name of the structure."""
-    response: Part | None = None
+    response: FittedPart | None = None
     """What the rotor speeds show of lag, delay and rate loop, if they were measured."""
-    misfits: tuple[Misfit, ...] = ()
+    misfits: tuple[LeftOver, ...] = ()
     """What the fit leaves over, by sensor."""
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[FittedPart, ...]:
         """What was fitted, each part by itself."""
-        own = Part(self.model.base, self.model.unknowns, self.p, self.sigma, self.fit.covariance, self.fit.noise)
+        own = FittedPart(self.model.base, self.model.unknowns, self.p, self.sigma, self.fit.covariance, self.fit.noise)
         return (own,) if self.response is None else (own, self.response)
 
 
-def relative_sigma(part: Part) -> np.ndarray:
+def relative_sigma(part: FittedPart) -> np.ndarray:
     """Standard deviations of the unknowns, (u,), relative to the value where the file has zero, as elsewhere."""
     return np.where(from_zero(part.base, part.unknowns) > 0, part.sigma / np.maximum(part.p, 1e-12), part.sigma)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.found import Found, Part, estimates_of, is_vague, refusals_of, whole_covariance
-from e2efly.alignment.misfit import Misfit, misfit, motion, white_noise, widened
+from e2efly.alignment.found import FittedPart, Found, estimates_of, is_vague, refusals_of, whole_covariance
+from e2efly.alignment.misfit import LeftOver, misfit, motion, white_noise, widened
 from e2efly.alignment.model import (
     FROM_ZERO,
     POSE_DELAY,
@@ -18,7 +18,7 @@ from e2efly.alignment.model import (
     from_zero,
     vehicle_of,
 )
-from e2efly.alignment.response import RESPONSE, responded
+from e2efly.alignment.rotor_response import RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.alignment.wrench import solved
@@ -207,13 +207,13 @@ def identify(
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, answer, tuple(left))
 
 
-def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[Part, list[Misfit]]:
+def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[FittedPart, list[LeftOver]]:
     """What the rotor speeds show of lag, delay and rate loop, and what is left over."""
     found, left = responded(model, records, plain)
     off = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     off = np.hypot(off, [ROTOR_STRUCTURE.get(u.field, 0.0) for u in RESPONSE])
     sigma = widened(left, off, np.array([u.prior for u in RESPONSE]))
-    return Part(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
+    return FittedPart(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
 
 
 def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, source: str) -> list[Estimate]:
@@ -229,7 +229,7 @@ def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, so
     return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * sigma[z]), source)]
 
 
-def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[Misfit]:
+def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[LeftOver]:
     """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others."""
     left = []
     for name in found.squares:
@@ -329,7 +329,7 @@ def _given(p: np.ndarray, covariance: np.ndarray, refused: np.ndarray) -> tuple[
     return out, sigma
 
 
-def sigmas(model: Model, found: Fit, left: Sequence[Misfit]) -> np.ndarray:
+def sigmas(model: Model, found: Fit, left: Sequence[LeftOver]) -> np.ndarray:
     """Standard deviations of the unknowns. Each is the largest of three values, the spread between windows, the spread
     between flights and the effect of white noise, combined as a root sum of squares with the uncertainty of the model
     itself (`STRUCTURES`). What is left over widens them.

@@ -28,7 +28,7 @@ WRONG = 2.0
 
 
 @dataclass(frozen=True)
-class Misfit:
+class LeftOver:
     """What a fit leaves over of a sensor's motion."""
 
     sensor: str
@@ -49,7 +49,7 @@ class Misfit:
         )
 
 
-def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) -> Misfit:
+def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) -> LeftOver:
     """What is left over of a sensor.
 
     Args:
@@ -65,7 +65,7 @@ def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) ->
     calm, lively = np.split(order, [np.searchsorted(motion[order] ** 2, CALM * white**2)])
     bins = [calm] * (len(calm) > 2) + np.array_split(lively, min(BINS, len(lively) // 3) or 1)
     if len(lively) < 3 or len(bins) < 2:
-        return Misfit(sensor, 0.0, 1.0)
+        return LeftOver(sensor, 0.0, 1.0)
     left = np.array([np.median(square[i]) for i in bins])
     moved = np.array([np.median(motion[i]) for i in bins]) ** 2
     table = np.stack([np.ones(len(bins)), moved], -1)
@@ -73,7 +73,7 @@ def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) ->
     tolerated = SHARE**2 * moved[-1]
     calm, least = noise + tolerated, min(white**2, noise) + tolerated
     growth = np.sqrt((noise + share * moved[-1]) / np.sqrt(calm * least))
-    return Misfit(sensor, float(np.sqrt(share)), max(float(growth), 1.0))
+    return LeftOver(sensor, float(np.sqrt(share)), max(float(growth), 1.0))
 
 
 def white_noise(values: np.ndarray) -> float:
@@ -100,7 +100,7 @@ def mean_square(left: np.ndarray, there: np.ndarray) -> np.ndarray:
         return np.asarray(np.sum((left * there) ** 2, 1) / there.sum(1))
 
 
-def widened(misfits: Sequence[Misfit], sigma: np.ndarray, prior: np.ndarray) -> np.ndarray:
+def widened(misfits: Sequence[LeftOver], sigma: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """Standard deviations, (u,), as wide as what is left over demands. They are what they were unless something is
     missing in the model. `prior` has those from before the flights.
 

@@ -14,7 +14,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.alignment.least_squares import Solution, solve
-from e2efly.alignment.misfit import Misfit, mean_square, misfit, motion, white_noise
+from e2efly.alignment.misfit import LeftOver, mean_square, misfit, motion, white_noise
 from e2efly.alignment.model import Model, Unknown, value_of, vehicle_of
 from e2efly.alignment.windows import GAP, STEP, integral, on_grid, past_steps
 from e2efly.control.vectors import Quat, Vec3
@@ -85,7 +85,7 @@ def measurements(model: Model, records: Sequence[Record]) -> tuple[dict[str, Any
     return data, {"mean": data["there"], "difference": np.repeat(data["there"], 3, axis=1)}
 
 
-def responded(model: Model, records: Sequence[Record], plain: bool = False) -> tuple[Solution, list[Misfit]]:
+def responded(model: Model, records: Sequence[Record], plain: bool = False) -> tuple[Solution, list[LeftOver]]:
     """The unknowns of `RESPONSE`, and what is left over. `plain`: the vehicle has nothing that its file lacks."""
     data, there = measurements(model, records)
     prior = np.array([u.prior for u in RESPONSE])
@@ -110,7 +110,7 @@ def responded(model: Model, records: Sequence[Record], plain: bool = False) -> t
     return found, [_misfit(name, r, data, noise / 2) for name, r in found.left.items()]  # of four rotors together
 
 
-def _misfit(name: str, left: np.ndarray, data: dict[str, Any], white: float) -> Misfit:
+def _misfit(name: str, left: np.ndarray, data: dict[str, Any], white: float) -> LeftOver:
     """What is left over of the mean of the rotors, or of their differences, in quiet and lively parts of windows."""
     n, points = data["there"].shape
     step = points // PIECES
