@@ -10,7 +10,7 @@ from e2efly.alignment.alignment import align
 from e2efly.alignment.checks import checked
 from e2efly.alignment.identification import driver_of
 from e2efly.commands.align import pose_delay_of
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, StepsOptions, excitation
+from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, InPlace, StepsOptions, excitation
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.pilot.flight_state import Mission, Mode, Reason
 from e2efly.flight.settings import Fence
@@ -22,7 +22,7 @@ from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
-from tests.validation.firmware_excitation import fly_excited
+from tests.validation.firmware_excitation import Excited, fly_excited
 
 FILE = load_vehicle("vis_r")
 BODY = dataclasses.replace(FILE, mass=0.85, inertia=FILE.inertia * 1.2, motor_time_constant=0.045, latency=0.05)
@@ -30,21 +30,21 @@ SETTINGS = dataclasses.replace(rehearsal_settings(1.2), fence=Fence(low=(-4.0, -
 SHORT = ExcitationOptions(seconds=10.0)
 
 
+def flown(log: Path, options: InPlace) -> Excited:
+    """A complete flight, with its log and its blackbox."""
+    with Telemetry(log) as telemetry:
+        flight = fly_excited(
+            firmware_program.chosen(), FILE, BODY, SETTINGS, options=options, log=telemetry, folder=log.parent,
+            blackbox=True,
+        )  # fmt: skip
+    assert flight.complete
+    return flight
+
+
 @pytest.mark.whole
 def test_it_ends_by_itself_and_its_log_and_blackbox_are_read_together(tmp_path: Path) -> None:
     log = tmp_path / "flight.mcap"
-    with Telemetry(log) as telemetry:
-        flight = fly_excited(
-            firmware_program.chosen(),
-            FILE,
-            BODY,
-            SETTINGS,
-            options=SHORT,
-            log=telemetry,
-            folder=tmp_path,
-            blackbox=True,
-        )
-    assert flight.complete
+    flight = flown(log, SHORT)
     changes = {mode: (at, reasons) for at, mode, reasons in flight.flown.changes}
     begun = changes["policy"][0]
     (ended,) = [at for at, mode, reasons in flight.flown.changes if Reason.POLICY_DONE in reasons]
@@ -101,18 +101,7 @@ def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
 def test_steps_are_flown_and_aligned_by_the_log_of_the_bridge_alone(tmp_path: Path) -> None:
     """The delay by the rig's clock within 3 ms, the motor lag within its sigma; the blackbox has the loop's terms."""
     log = tmp_path / "flight.mcap"
-    with Telemetry(log) as telemetry:
-        flight = fly_excited(
-            firmware_program.chosen(),
-            FILE,
-            BODY,
-            SETTINGS,
-            options=StepsOptions(count=2),
-            log=telemetry,
-            folder=tmp_path,
-            blackbox=True,
-        )
-    assert flight.complete
+    flight = flown(log, StepsOptions(count=2))
     assert flight.blackbox is not None
     (exact,) = with_blackboxes([flight.truth, *read_flights(flight.blackbox)])
     link, age = setpoint_delay(exact), flight.truth.pose_age

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from e2efly.alignment.comparison import lagged
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.found import Found, Refusal
 from e2efly.alignment.identification import identify
 from e2efly.alignment.model import Model
 from e2efly.alignment.replay import Stretches, asking, replay, rms, stretches, thrust_is_told, wrong
 from e2efly.alignment.thrust_response import FLY as THRUST_STEPS
-from e2efly.alignment.thrust_response import ThrustResponse, lagged, thrust_response
+from e2efly.alignment.thrust_response import ThrustResponse, thrust_response
 from e2efly.alignment.windows import REACH, STEP
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import Record

@@ -1,13 +1,13 @@
 """Streams of a flight at common times, so that they can be compared."""
 
 import numpy as np
+from scipy.signal import lfilter
 
+from e2efly.control import Quat
 from e2efly.logs.recording import Record, Stream
 
 GRID = 0.005
 """Time between two points at which gyroscope and attitude are compared, s."""
-
-
 EDGE = 9
 """Points at either end that are left out, where there is nothing to average over."""
 
@@ -48,6 +48,20 @@ def turning(q: np.ndarray, step: float) -> np.ndarray:
     return 2 * np.stack(
         [w * dx - x * dw - y * dz + z * dy, w * dy + x * dz - y * dw - z * dx, w * dz - x * dy + y * dx - z * dw], -1
     )
+
+
+def turns(pose: Stream) -> Stream:
+    """The body rates by which attitudes go over into each other, rad/s, each in the middle between two of them."""
+    before, after = Quat.of(pose.values[:-1]), Quat.of(pose.values[1:])
+    away, passed = before.conjugate().compose(after).stack(), np.diff(pose.time)
+    return Stream(pose.time[:-1] + passed / 2, 2 * away[:, 1:] * np.sign(away[:, :1]) / passed[:, None])
+
+
+def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
+    """Values, (..., t), after a first-order lag, s, on a grid of a step, s, beginning at rest."""
+    kept = np.exp(-step / max(constant, 1e-6))
+    begin = kept * values[..., :1]
+    return np.asarray(lfilter([1 - kept], [1, -kept], values, zi=begin)[0])
 
 
 def continuous(q: np.ndarray) -> np.ndarray:

@@ -39,13 +39,13 @@ class Refusal:
     def __str__(self) -> str:
         if self.impossible:
             return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
+        unit = Vehicle.__dataclass_fields__[self.unknown.field].metadata["unit"] if self.unknown.field else "1"
         if self.added:
-            off = f"{self.sigma * self.added:.2g} {Vehicle.__dataclass_fields__[self.unknown.field].metadata['unit']}"
+            off = f"{self.sigma * self.added:.2g} {unit}"
             return (
                 f"{self.unknown.name} stays 0, as in the file: the flights show it to +- {off}; fly: {self.unknown.fly}"
             )
-        unit = " s" if self.unknown.field == "latency" else ""
-        how = f"+- {self.sigma:.2g}{unit}" if unit else f"+- {100 * self.sigma:.0f} %"
+        how = f"+- {self.sigma:.2g} {unit}" if self.unknown.added else f"+- {100 * self.sigma:.0f} %"
         return f"{self.unknown.name} is not taken from the flights ({how}); fly: {self.unknown.fly}"
 
 

@@ -154,11 +154,17 @@ def identify(
     held_out = np.arange(windows.count) % every == every - 1
     seen = windows.some(~held_out)
     absent = np.array([plain and unknown.absent(vehicle) for unknown in model.unknowns])
-    if driver == "rotor_speed":
-        found = solved(model, seen, records, absent)
-    else:
-        found = fit(model, seen, begin(model, seen), told=told)
-    sigma = sigmas(model, found, misfits(found, seen, records))
+
+    def fitted(start: np.ndarray, fixed: np.ndarray) -> tuple[Fit, list[LeftOver]]:
+        found = (
+            solved(model, seen, records, fixed)
+            if driver == "rotor_speed"
+            else fit(model, seen, start, told=told, fixed=fixed)
+        )
+        return found, misfits(found, seen, records)
+
+    found, left = fitted(np.zeros(len(absent)) if driver == "rotor_speed" else begin(model, seen), absent)
+    sigma = sigmas(model, found, [] if step else left)
     impossible = _impossible(model, found.p)
     refused = absent | impossible | _taken_back(model, found.p, sigma)
     p, known = _given(found.p, whole_covariance(found, sigma), refused)
@@ -168,11 +174,8 @@ def identify(
         if not refused.any() or (near and not unclear):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
-        if driver == "rotor_speed":
-            found = solved(model, seen, records, refused)
-        else:
-            found = fit(model, seen, np.where(refused, 0.0, found.p), told=told, fixed=refused)
-        sigma = np.where(refused, sigma, sigmas(model, found, misfits(found, seen, records)))
+        found, left = fitted(np.where(refused, 0.0, found.p), refused)
+        sigma = np.where(refused, sigma, sigmas(model, found, [] if step else left))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
         more = refused | impossible | is_vague(model.base, model.unknowns, p, sigma)
@@ -184,10 +187,12 @@ def identify(
     if structures:
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
+    if step:  # a rate loop of another kind has gains that come nearest, too: it widens, and refuses none
+        sigma = np.where(refused, sigma, sigmas(model, found, left))
     refusals = refusals_of(model.base, model.unknowns, sigma, refused & ~absent, impossible)
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = estimates_of(model.base, model.unknowns, p, sigma, refused, source)
-    left, answer = misfits(found, seen, records), None
+    answer = None
     late = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
     answered = None if late is None else (float(model.base.latency) + float(p[late]), float(sigma[late]))
     if driver == "rotor_speed":

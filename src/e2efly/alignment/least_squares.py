@@ -15,6 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from e2efly.control.vectors import namespace
+
 HUBER = 2.0
 """Up to this number of standard deviations, a residual counts with its square."""
 NEIGHBOURS = 4
@@ -45,6 +47,8 @@ class Solution:
     """(groups, k, k) of each group, without the prior."""
     prior: np.ndarray
     """(k,) standard deviations about zero."""
+    bound: np.ndarray
+    """(k,) which numbers are as small as possible, and would be smaller."""
     iterations: int
 
 
@@ -82,7 +86,7 @@ def solve(
         return {k: max(float(np.sqrt(np.sum((x * there[k]) ** 2) / counts[k])), floor[k]) for k, x in r.items()}
 
     def cost(r: Mapping[str, np.ndarray], noise: Mapping[str, float], x: np.ndarray) -> float:
-        by_sensor = sum(float(np.sum(_huber(v / noise[k]) * there[k])) for k, v in r.items())
+        by_sensor = sum(float(np.sum(huber(v / noise[k]) * there[k])) for k, v in r.items())
         return by_sensor + 0.5 * float(np.sum((x / prior) ** 2))
 
     x, damping, done = np.maximum(start, least), 1e-3, 0
@@ -93,8 +97,8 @@ def solve(
         done += 1
         H = curvatures.sum(0) + np.diag(prior**-2)
         g = gradients.sum(0) + x / prior**2
-        held = np.flatnonzero((x <= least) & (g > 0))
-        H[held, held] *= 1e12
+        bound = np.flatnonzero((x <= least) & (g > 0))
+        H[bound, bound] *= 1e12
         now, tried = cost(r, noise, x), np.inf
         for _ in range(8):
             step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
@@ -114,22 +118,35 @@ def solve(
     H = curvatures.sum(0) + np.diag(prior**-2)
     inverse = np.linalg.inv(H)
     sandwich = inverse @ (correlated(gradients) + np.diag(prior**-2)) @ inverse
-    return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, prior, done)
+    bound = (x <= least) & (gradients.sum(0) + x / prior**2 > 0)
+    return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, prior, bound, done)
 
 
 def between(found: Solution, part: np.ndarray) -> np.ndarray:
-    """Standard deviations, (k,), by the jackknife over parts of the data: each is left out in turn, and the others take
-    one step. `part` is the number of the part that each group belongs to, (groups,). Zeros for one part.
-    """
+    """The jackknife over parts of the data, (k,). `part` is the number of the part of each group, (groups,)."""
     parts = np.unique(part)
-    if len(parts) < 2:
-        return np.zeros(len(found.x))
-    stiff, pulled = np.diag(found.prior**-2), found.x / found.prior**2
-    steps = [
-        np.linalg.solve(found.curvatures[part != one].sum(0) + stiff, found.gradients[part != one].sum(0) + pulled)
-        for one in parts
-    ]
-    return np.asarray(np.sqrt((len(parts) - 1) * np.var(steps, axis=0)))
+    curvatures, gradients = (
+        np.stack([x[part == one].sum(0) for one in parts]) for x in (found.curvatures, found.gradients)
+    )
+    stiff = np.diag(np.where(found.bound, 1e12, 1.0) * found.prior**-2)
+    return jackknife(curvatures, gradients, stiff, found.x / found.prior**2)
+
+
+def jackknife(curvatures: np.ndarray, gradients: np.ndarray, stiff: np.ndarray, pulled: np.ndarray) -> np.ndarray:
+    """Standard deviations of a fit, (k,), by the spread between parts of its data: each is left out in turn, and the
+    others take one step. Zeros for one part.
+
+    Args:
+        curvatures: of each part, (parts, k, k).
+        gradients: of each part, (parts, k).
+        stiff: curvature of the prior, (k, k).
+        pulled: gradient of the prior, (k,).
+    """
+    if len(gradients) < 2:
+        return np.zeros(len(pulled))
+    H, g = curvatures.sum(0) + stiff, gradients.sum(0) + pulled
+    steps = [np.linalg.solve(H - own, g - pull) for own, pull in zip(curvatures, gradients, strict=True)]
+    return np.asarray(np.sqrt((len(steps) - 1) * np.var(steps, axis=0)))
 
 
 def correlated(gradients: np.ndarray) -> np.ndarray:
@@ -159,9 +176,11 @@ def _terms(
     return np.sum(g, 0), np.sum(H, 0)
 
 
-def _huber(r: np.ndarray) -> np.ndarray:
-    size = np.abs(r)
-    return np.where(size < HUBER, 0.5 * r**2, HUBER * (size - HUBER / 2))
+def huber(r: Array | np.ndarray) -> Any:
+    """Huber's cost of residuals over their standard deviation."""
+    xp = namespace(r)
+    size = xp.abs(r)
+    return xp.where(size < HUBER, 0.5 * r**2, HUBER * (size - HUBER / 2))
 
 
 def _numpy(found: Mapping[str, Array]) -> dict[str, np.ndarray]:

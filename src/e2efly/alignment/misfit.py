@@ -71,8 +71,8 @@ def misfit(sensor: str, square: np.ndarray, motion: np.ndarray, white: float) ->
     table = np.stack([np.ones(len(bins)), moved], -1)
     (noise, share), _ = nnls(table / left[:, None], np.ones(len(bins)))  # relative errors count alike
     tolerated = SHARE**2 * moved[-1]
-    calm, least = noise + tolerated, min(white**2, noise) + tolerated
-    growth = np.sqrt((noise + share * moved[-1]) / np.sqrt(calm * least))
+    most, least = noise + tolerated, min(white**2, noise) + tolerated
+    growth = np.sqrt((noise + share * moved[-1]) / np.sqrt(most * least))
     return LeftOver(sensor, float(np.sqrt(share)), max(float(growth), 1.0))
 
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from e2efly.alignment.comparison import turns
 from e2efly.alignment.model import FACTOR, GYRO, LOST, NUISANCES, POSE_DELAY, START, TILT, Model
 from e2efly.alignment.prediction import off, simulated
 from e2efly.alignment.windows import REACH, STEP, Windows, cut, join
+from e2efly.control.vectors import Quat
 from e2efly.logs.recording import Record, Stream
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -167,13 +169,7 @@ def _prescribed(record: Record) -> Record:
     """With the body rates by which its attitudes go over into each other, in the place of the gyroscope's, of which a
     slow log misses too much.
     """
-    pose = record.streams["quaternion"]
-    a, b = pose.values[:-1], pose.values[1:]
-    w = np.sum(a * b, -1)
-    x = a[:, :1] * b[:, 1:] - b[:, :1] * a[:, 1:] - np.cross(a[:, 1:], b[:, 1:])
-    dt = np.diff(pose.time)
-    rates = 2 * x * np.sign(w)[:, None] / dt[:, None]
-    return dataclasses.replace(record, streams={**record.streams, "body_rate": Stream(pose.time[:-1] + dt / 2, rates)})
+    return dataclasses.replace(record, streams={**record.streams, "body_rate": turns(record.streams["quaternion"])})
 
 
 def _flown(model: Model, p: np.ndarray, q: np.ndarray, windows: Windows) -> dict[str, np.ndarray]:
@@ -195,8 +191,7 @@ def _held(windows: Windows) -> dict[str, np.ndarray]:
 def _hovering(record: Record, windows: Windows) -> dict[str, np.ndarray]:
     """A point mass whose thrust stays that which carries the flight on average, along the measured attitude."""
     pose, speed = record.streams["quaternion"], record.streams["velocity"]
-    w, x, y, z = (pose.values / np.linalg.norm(pose.values, axis=1, keepdims=True)).T
-    up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], -1)
+    up = Quat.of(pose.values).normalized().z_axis().stack()
     time = windows.begin[:, None] + STEP * np.arange(windows.steps + 1)
     gained = (speed.values[-1, 2] - speed.values[0, 2]) / (speed.time[-1] - speed.time[0])
     carried = np.trapezoid(up[:, 2], pose.time) / (pose.time[-1] - pose.time[0])

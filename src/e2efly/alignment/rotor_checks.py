@@ -4,9 +4,8 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
-from scipy.signal import lfilter
 
-from e2efly.alignment.comparison import GRID, at_times, common_times, pearson, smooth
+from e2efly.alignment.comparison import GRID, at_times, common_times, lagged, pearson, smooth
 from e2efly.alignment.unit_checks import AGREE, scaled
 from e2efly.logs.recording import KINDS, Record
 from e2efly.vehicles.gravity import GRAVITY
@@ -120,7 +119,7 @@ def check_rotor_order(record: Record, vehicle: Vehicle) -> None:
         return
     w = smooth(at_times(rate, grid))
     thrust = at_times(rotors, grid)
-    thrust = smooth(thrust**2 if name == "rotor_speed" else _lagged(thrust, vehicle))
+    thrust = smooth(thrust**2 if name == "rotor_speed" else _answering(thrust, vehicle))
     turn = np.gradient(w, GRID, axis=0)[:, :2]
     x, y = vehicle.rotor_position.T
 
@@ -141,11 +140,9 @@ def check_rotor_order(record: Record, vehicle: Vehicle) -> None:
         )
 
 
-def _lagged(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+def _answering(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     """The approximate response of the rotors to motor outputs: with the vehicle's motor lag and a delay of two grid
     steps.
     """
-    kept = float(np.exp(-GRID / vehicle.motor_time_constant))
     late = np.concatenate([outputs[:1], outputs[:1], outputs[:-2]])
-    first = kept * late[:1]
-    return np.asarray(lfilter([1 - kept], [1, -kept], late, axis=0, zi=first)[0])
+    return lagged(late.T, float(vehicle.motor_time_constant), GRID).T

@@ -13,11 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from e2efly.alignment.comparison import turns
 from e2efly.alignment.least_squares import Solution, solve
 from e2efly.alignment.misfit import LeftOver, mean_square, misfit, motion, white_noise
 from e2efly.alignment.model import Model, Unknown, value_of, vehicle_of
 from e2efly.alignment.windows import GAP, STEP, integral, on_grid, past_steps
-from e2efly.control.vectors import Quat, Vec3
+from e2efly.control.vectors import Vec3
 from e2efly.logs.recording import Record, Stream
 from e2efly.simulation.physics.body import gyroscopic_torque, rotor_speed_for
 from e2efly.simulation.physics.integrate import lagged
@@ -35,10 +36,9 @@ QUICKEST = 1e-5
 SMOOTHED = 0.01
 """Typical time constant of the filter of the commanded rates whose derivative is fed forward, s."""
 _FLY = "steps of thrust and body rate, logged at 200 Hz or more, with the times at which commands were sent"
-SLOWS = Unknown("motor_time_constant_down", "motor_time_constant_down", (), 0.7, (), _FLY)
 RESPONSE: tuple[Unknown, ...] = (
     Unknown("motor_time_constant", "motor_time_constant", (), 0.7, (), _FLY),
-    SLOWS,
+    Unknown("motor_time_constant_down", "motor_time_constant_down", (), 0.7, (), _FLY),
     Unknown("latency", "latency", (), 0.05, (), _FLY, added=True),
     Unknown("command_scale", "", (), 0.1, (), _FLY),
     Unknown("rate_gain_x", "rate_gain", (0,), 0.7, (), _FLY),
@@ -54,6 +54,9 @@ RESPONSE: tuple[Unknown, ...] = (
 """Unknowns of the response. `command_scale` is the logarithm of a factor on the rotor speeds that are asked for;
 `feed_forward` the part of the commanded angular acceleration that follows the derivative of the commanded rates;
 `feed_forward_lag` the logarithm of the time constant of the filter before it over `SMOOTHED`."""
+
+
+LAGS = ("motor_time_constant", "motor_time_constant_down")
 
 
 def measurements(model: Model, records: Sequence[Record]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -79,6 +82,7 @@ def measurements(model: Model, records: Sequence[Record]) -> tuple[dict[str, Any
             "command": np.diff(driven.reshape(n, -1, 4), axis=1) / STEP,
             "rate": rates.reshape(n, -1, 3) - gyro_bias(record),
             "speed": speeds,
+            "turning": _turning(model, speeds[:, 1:]),
             "there": (near.reshape(n, -1) & free)[:, past:].astype(float),
         })  # fmt: skip
     data = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -97,15 +101,9 @@ def responded(model: Model, records: Sequence[Record], plain: bool = False) -> t
     start = np.zeros(len(RESPONSE))
     start[quick] = max(least[quick], 0.0) + 1e-3
 
-    up, down = names.index("motor_time_constant"), names.index("motor_time_constant_down")
-
-    def residuals(x: Array, data: dict[str, Any]) -> dict[str, Array]:
-        x = x.at[down].set(x[up]) if plain else x
-        return jax.vmap(lambda window: _residuals(model, x, window))(data)
-
+    held = np.array([plain and (u.absent(model.base) or u.name.startswith("feed_forward")) for u in RESPONSE])
     with jax.enable_x64(True):
-        held = np.array([plain and (u.absent(model.base) or u.name.startswith("feed_forward")) for u in RESPONSE])
-        found = solve(residuals, data, there, start, prior, FLOOR, least, held)
+        found = solve(_residuals, (model, np.asarray(plain), data), there, start, prior, FLOOR, least, held)
     noise = float(np.mean([white_noise(record.streams["rotor_speed"].values) for record in records]))
     return found, [_misfit(name, r, data, noise / 2) for name, r in found.left.items()]  # of four rotors together
 
@@ -125,7 +123,15 @@ def _misfit(name: str, left: np.ndarray, data: dict[str, Any], white: float) -> 
     return misfit(f"rotor speeds, {name}", square, moved, white)
 
 
-def _residuals(model: Model, x: Array, window: dict[str, Any]) -> dict[str, Array]:
+def _residuals(x: Array, data: tuple[Model, Array, dict[str, Any]]) -> dict[str, Array]:
+    """Of all windows, by sensor, (n, rows) rad/s. A plain vehicle's rotors slow down as they speed up."""
+    model, plain, windows = data
+    up, down = (next(i for i, u in enumerate(RESPONSE) if u.field == f) for f in LAGS)
+    x = x.at[down].set(jnp.where(plain, x[up], x[down]))
+    return jax.vmap(lambda window: _of_window(model, x, window))(windows)
+
+
+def _of_window(model: Model, x: Array, window: dict[str, Any]) -> dict[str, Array]:
     """Of one window, by sensor, (rows,) rad/s."""
     past = past_steps()
     spun = _rotors(model, x, window)[past:]
@@ -179,16 +185,16 @@ def _rotors(model: Model, x: Array, window: dict[str, Any]) -> Array:
     first, rates = Vec3.of(window["rate"][0]), (window["rate"][1:] + window["rate"][:-1]) / 2
     error = command[:, 1:] - rates
     summed = vehicle.rate_integral_gain * jnp.cumsum(error, axis=0) * STEP
-    held = jnp.mean(_turning(model, window["speed"][1:]) - vehicle.rate_gain * error - summed, axis=0)
+    held = jnp.mean(window["turning"] - vehicle.rate_gain * error - summed, axis=0)
     start = split4(window["speed"][0]), first, Vec3.of(command[0, 1:]), Vec3.of(held)
     _, later = jax.lax.scan(follow, start, (earlier, command, window["rate"][:-1], window["rate"][1:]))
     return jnp.concatenate([window["speed"][:1], later])
 
 
-def _turning(model: Model, speed: Array) -> Array:
-    """The angular acceleration, (m, 3) rad/s^2, that rotor speeds, (m, 4), give the flight controller's vehicle."""
+def _turning(model: Model, speed: np.ndarray) -> np.ndarray:
+    """The angular acceleration, (..., 3) rad/s^2, that rotor speeds, (..., 4), give the flight controller's vehicle."""
     wrench = _thrust(model, speed) @ allocation_matrix(model.believed).T
-    return wrench[:, 1:] / model.believed.inertia
+    return wrench[..., 1:] / np.asarray(model.believed.inertia)
 
 
 def _free(model: Model, speed: np.ndarray) -> np.ndarray:
@@ -198,7 +204,7 @@ def _free(model: Model, speed: np.ndarray) -> np.ndarray:
     return np.asarray(((thrust > low + margin) & (thrust < high - margin)).all(-1))
 
 
-def _thrust(model: Model, speed: Any) -> Any:
+def _thrust(model: Model, speed: np.ndarray) -> np.ndarray:
     k2, k1, k0 = model.believed.thrust_map
     return (k2 * speed + k1) * speed + k0
 
@@ -214,10 +220,9 @@ def gyro_bias(record: Record) -> np.ndarray:
     if not record.has("quaternion"):
         return np.zeros(3)
     pose, gyro = record.streams["quaternion"], record.streams["body_rate"]
-    inside = (pose.time >= gyro.time[0]) & (pose.time <= gyro.time[-1])
-    time, q = pose.time[inside], Quat.of(pose.values[inside])
-    turn = Quat.of(q.stack()[:-1]).conjugate().compose(Quat.of(q.stack()[1:])).stack()
-    angle = 2 * turn[:, 1:] * np.sign(turn[:, :1])
-    summed = integral(gyro, np.concatenate([gyro.time[:1], time]), held=False)[1:]
-    short = np.diff(time) < GAP / pose.rate
-    return np.asarray((np.diff(summed, axis=0) - angle)[short].sum(0) / np.diff(time)[short].sum())
+    pose = pose.during(gyro.time[0], gyro.time[-1])
+    passed, turned = np.diff(pose.time), turns(pose).values
+    summed = integral(gyro, np.concatenate([gyro.time[:1], pose.time]), held=False)[1:]
+    short = passed < GAP / pose.rate
+    more = np.diff(summed, axis=0) - turned * passed[:, None]
+    return np.asarray(more[short].sum(0) / passed[short].sum())

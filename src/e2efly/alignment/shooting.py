@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from e2efly.alignment.least_squares import HUBER, huber, jackknife
 from e2efly.alignment.model import (
     FACTOR,
     FORCE,
@@ -30,8 +31,6 @@ from e2efly.alignment.model import (
 )
 from e2efly.alignment.windows import LENGTH, Windows
 
-HUBER = 2.0
-"""Up to this number of standard deviations, a residual counts with its square."""
 NOISE = {
     "body_rate": 0.05, "specific_force": 0.5, "rotor_speed": 20.0, "velocity": 0.05, "quaternion": 0.02,
     "position": 0.01,
@@ -192,29 +191,15 @@ def _fit(
     np.add.at(groups, group, each)
     inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
     sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
-    between = np.zeros(u)
-    if flights > 1:
-        pulled = np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
-        stiff = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
-        stiff[held, held] *= 1e12
-        between = _between(terms, windows.flight, flights, pulled, stiff)[:u]
+    parts = [_assembled(terms, np.where(windows.flight == f, f, -1), flights, u, v) for f in range(flights)]
+    pulled = np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
+    stiff = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+    stiff[held, held] *= 1e12
+    between = jackknife(np.stack([H for H, _ in parts]), np.stack([g for _, g in parts]), stiff, pulled)[:u]
     left = at(_costs, p, q, starts, noise)
     with np.errstate(invalid="ignore", divide="ignore"):
         squares = {name: left[f"square/{name}"] / left[f"sum/{name}"] for name in noise}
     return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], between, noise, i, squares)
-
-
-def _between(
-    terms: dict[str, Any], flight: np.ndarray, flights: int, pulled: np.ndarray, stiff: np.ndarray
-) -> np.ndarray:
-    """Standard deviations by the jackknife over flights: each is left out in turn, and the others take one step."""
-    u = terms["H"].shape[1] - len(NUISANCES)
-    steps = []
-    for f in range(flights):
-        kept = {k: terms[k][flight != f] for k in ("H", "g")}
-        H, g = _assembled(kept, flight[flight != f], flights, u, len(NUISANCES))
-        steps.append(np.linalg.solve(H + stiff, g + pulled))
-    return np.sqrt((flights - 1) * np.var(steps, axis=0))
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
@@ -299,7 +284,7 @@ def _costs(
 
     def one(data: dict[str, Any]) -> dict[str, Array]:
         left = _residuals(model, p, q[data["flight"]], data["moved"], data, noise)
-        costs = sum(jnp.sum(_huber(left[name] / noise[name])) for name in noise)
+        costs = sum(jnp.sum(huber(left[name] / noise[name])) for name in noise)
         told = {"cost": costs * data["counts"] + 0.5 * jnp.sum((data["moved"] / free) ** 2)}
         for name in noise:
             told[f"square/{name}"] = jnp.sum(left[name] ** 2) * data["counts"]
@@ -357,11 +342,6 @@ def _residuals(
         else:
             left[name] = (seen[name] - measured) * there
     return left
-
-
-def _huber(r: Array) -> Array:
-    size = jnp.abs(r)
-    return jnp.where(size < HUBER, 0.5 * r**2, HUBER * (size - HUBER / 2))
 
 
 def _assembled(

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
+from e2efly.alignment.comparison import lagged
+from e2efly.alignment.least_squares import HUBER
 from e2efly.alignment.model import FORCE_FILTER
-from e2efly.alignment.shooting import FLOOR, HUBER
+from e2efly.alignment.shooting import FLOOR
 from e2efly.logs.blackbox_merge import DELAY_SIGMA
 from e2efly.logs.readers import BLACKBOX, OURS
 from e2efly.logs.recording import Record, Stream
@@ -187,13 +188,6 @@ def _foretold(p: np.ndarray, command: Stream, time: np.ndarray) -> np.ndarray:
     for _ in range(2):
         force = lagged(force, stage, GRID)
     return gain * np.interp(time, grid, force)
-
-
-def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
-    """Values, (..., t), after a first-order lag, s, on a grid of a step, s, beginning at rest."""
-    kept = np.exp(-step / max(constant, 1e-6))
-    begin = kept * values[..., :1]
-    return lfilter([1 - kept], [1, -kept], values, zi=begin)[0]
 
 
 def _changes(command: Stream) -> float:
