@@ -15,8 +15,8 @@ the poses, and the time from a command to the setpoint.
 `--plant structure` flies them in MuJoCo with a structure that no vehicle file tells, behind a rate loop of its own
 (`benchmarks/hidden_bodies.py`). Each is identified from its whole log, with `--bare` also without its rotor speeds.
 `--plain` hides the structure from the first fit, too: what is then off by three standard deviations wants an alarm.
-`--first` is the seed of the first vehicle. A flight that ends before its excitation does is named in the JSON file,
-and has no errors to count.
+`--first` is the seed of the first vehicle. A flight that ends before its excitation does, and a log that is refused, are
+named in the JSON file, and have no errors to count.
 """
 
 import dataclasses
@@ -54,7 +54,7 @@ AIR = 5.0
 
 
 class EndedEarlyError(Exception):
-    """The bridge left the excitation before its end: the message says the vehicle and its changes of mode."""
+    """The bridge left the excitation before its end: the message says its changes of mode."""
 
 
 ALARM, WITH, WITHOUT = "alarm", "with rotor speeds", "without rotor speeds"
@@ -82,7 +82,7 @@ def through_firmware(vehicle: Vehicle, seed: int) -> dict[str, Errors]:
                 sag=rng.uniform(0, 0.08), seed=seed,
             )  # fmt: skip
         if not flight.complete or flight.blackbox is None:
-            raise EndedEarlyError(f"vehicle {seed}: {flight.flown.changes}")
+            raise EndedEarlyError(str(flight.flown.changes))
         (exact,) = with_blackboxes([flight.truth, *read_flights(flight.blackbox)])
         link, age = setpoint_delay(exact), flight.truth.pose_age
         assert link is not None
@@ -192,9 +192,9 @@ def main() -> None:
                 found = through_firmware(vehicle, seed)
             else:
                 found = {"": one(vehicle, seed)}
-        except EndedEarlyError as early:
-            ended.append(str(early))
-            print(early, flush=True)
+        except (EndedEarlyError, ValueError) as error:
+            ended.append(f"{seed}: {error}")
+            print(ended[-1], flush=True)
             continue
         for label, errors_of in found.items():
             every.setdefault(label, []).append(errors_of)
@@ -203,7 +203,7 @@ def main() -> None:
     tables = {label: rows_of(found) for label, found in every.items()}
     seconds = (time.perf_counter() - began) / options.vehicles
     name = "identify" if options.plant == "mujoco" else f"identify_{options.plant}{'_plain' * options.plain}"
-    told = {"first": options.first, "seconds_each": seconds, "ended_early": ended}
+    told = {"first": options.first, "seconds_each": seconds, "ended_or_refused": ended}
     if options.plant == "mujoco":
         write(name, options.json, {"table": tables[""], **told, "vehicles": every[""]})
     else:

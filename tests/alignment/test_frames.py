@@ -30,6 +30,14 @@ def test_right_frames_stay(record: Record) -> None:
     assert not [note for note in found.notes if "moved" not in note]
 
 
+def test_a_biased_accelerometer_is_no_wrong_frame() -> None:
+    slow = flown(FILE, 12.0, Sensors(pose_delay=0.0, gaps=0), speed=2.0)
+    force = slow.streams["specific_force"]
+    biased = replace(force, values=force.values + np.array([0.45, 0.45, 0.0]))
+    (found,) = checked([replace(slow, streams={**slow.streams, "specific_force": biased})], FILE)
+    assert not [note for note in found.notes if "moved" not in note]
+
+
 def remedied(error: str) -> LogReading:
     """A reading of the log as an error says that it is accepted."""
     columns, without = re.search(r"--columns ((?:\w+=\w+\S* ?)+)", error), re.search(r"--without ([a-z_ ]+)$", error)

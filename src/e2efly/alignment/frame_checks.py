@@ -28,6 +28,8 @@ ENOUGH = {"turn": 0.15, "steer": 0.15, "push": 0.3, "slide": 0.1}
 FAINT, CLEAR = 0.02, 0.9
 """Less motion than `ENOUGH`, by this factor, shows an axis if the correlation is as strong as `CLEAR`, whatever its
 sign."""
+BIAS = 0.5
+"""Largest bias of an accelerometer that no frame has to explain, m/s^2."""
 LEAST_S = 1.5
 """Length of the shortest flight whose frames are checked, s."""
 ANSWER_S = 0.25
@@ -286,6 +288,9 @@ def _misfits(values: Values, changed: Collection[str] = tuple(KINDS)) -> dict[st
         acceleration = np.gradient(_averaged(moved), STEP, axis=0)
         if velocity is None:  # the noise of positions, differentiated twice, hides what averages show
             felt, acceleration = _averaged(felt), _averaged(acceleration)
+        inner = Quat(*q[(len(q) - len(felt)) // 2 :][: len(felt)].T)
+        away = inner.unrotate(Vec3(*(felt - acceleration).T)).stack().mean(0)
+        felt = felt - inner.rotate(Vec3(*np.clip(away, -BIAS, BIAS))).stack()
         compare("push", felt, acceleration)
         found["weight"] = Misfit.of(min(float(abs(np.mean(felt - acceleration, 0)[2])) / GRAVITY, 2.0))
     return found
