@@ -15,8 +15,8 @@ the poses, and the time from a command to the setpoint.
 `--plant structure` flies them in MuJoCo with a structure that no vehicle file tells, behind a rate loop of its own
 (`benchmarks/hidden_bodies.py`). Each is identified from its whole log, with `--bare` also without its rotor speeds.
 `--plain` hides the structure from the first fit, too: what is then off by three standard deviations wants an alarm.
-`--first` is the seed of the first vehicle. A flight that ends before its excitation does, and a log that is refused, are
-named in the JSON file, and have no errors to count.
+`--first` is the seed of the first vehicle. A flight that ends before its excitation does, and a log that is refused,
+are named in the JSON file, and have no errors to count.
 """
 
 import dataclasses

@@ -29,8 +29,9 @@ AT_REST, LEVEL = 0.02, 0.2
 is corrected, rad."""
 
 
-def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
-    """The flights, reduced to the parts that can be used. Their notes say what was cut.
+def checked(records: Sequence[Record], vehicle: Vehicle, hovers: bool = False) -> list[Record]:
+    """The flights, reduced to the parts that can be used. Their notes say what was cut. The height of flights that
+    `hovers` does not tell ground from air, so that only rotor speeds or motor outputs show what is in the air.
 
     Raises:
         ValueError: naming the file, what is wrong with it, and what is accepted.
@@ -61,7 +62,12 @@ def checked(records: Sequence[Record], vehicle: Vehicle) -> list[Record]:
                 raise
         record = in_one_frame(record, record.during(*flight.span))
         check_force_unit(record)
-        record = _in_the_air(_levelled(record), vehicle)
+        record = _levelled(record)
+        if driven or not hovers:
+            record = _in_the_air(record, vehicle)
+        else:
+            note = "has neither rotor speeds nor motor outputs: all of it is taken to be in the air"
+            record = replace(record, notes=(*record.notes, note))
         check_rotor_order(record, vehicle)
         found.append(check_commanded_thrust(record, vehicle))
     return found

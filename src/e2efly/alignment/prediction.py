@@ -1,5 +1,6 @@
 """Open-loop simulation of windows from their measured starts, and how far it is from what was measured."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,13 +22,20 @@ class Prediction:
     time: np.ndarray
     """(m + 1,) time since the start of a window, s."""
     before: dict[str, np.ndarray]
-    """By stream, (m + 1,): root mean square error of the file's vehicle at that time."""
+    """By stream, (m + 1,): root mean square error of the file's vehicle at that time. NaN: nothing was measured."""
     after: dict[str, np.ndarray]
     """The same for the identified vehicle."""
     measured: dict[str, np.ndarray]
     """Measurements by stream, (n, m + 1, k)."""
     old: dict[str, np.ndarray]
     new: dict[str, np.ndarray]
+
+    def at(self, errors: np.ndarray, seconds: Sequence[float]) -> np.ndarray:
+        """Errors (m + 1,) at some times since the start of a window, between those that were measured. NaN beyond."""
+        told = np.isfinite(errors)
+        if not told.any():
+            return np.full(len(seconds), np.nan)
+        return np.interp(seconds, self.time[told], errors[told], right=np.nan)
 
 
 def judged(found: Found) -> Prediction:
@@ -39,7 +47,8 @@ def judged(found: Found) -> Prediction:
 
     def wrong(seen: dict[str, np.ndarray], name: str) -> np.ndarray:
         square = np.sum(off(windows, seen, name) ** 2, -1)
-        return np.sqrt(np.nansum(square, 0) / np.maximum(np.isfinite(square).sum(0), 1))
+        count = np.isfinite(square).sum(0)
+        return np.sqrt(np.where(count, np.nansum(square, 0) / np.maximum(count, 1), np.nan))
 
     names = [name for name in windows.measured if windows.there[name].any()]
     return Prediction(

@@ -32,6 +32,7 @@ _EXAMPLES = {
     "build PARTS.toml": "from a list of parts to a vehicle file and the policies of six tasks",
     "tune LOG --task race": "from logs of your vehicle to a policy for it",
     "align LOG": "fit delay, rate loop and motor lag to a flight, lay its replay over it",
+    "alignment-report FOLDER": "identification, latency, randomisation and noise on one page",
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
     "airsim-settings VEHICLE": "AirSim's settings.json for a vehicle",

@@ -14,7 +14,7 @@ from rich.table import Table
 from e2efly.commands.log_options import LogOptions, read_checked
 from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.names import unknown
-from e2efly.config.storage import held, write_json
+from e2efly.config.storage import finite, held, write_json
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 from e2efly.vehicles.vehicle import Vehicle
@@ -229,7 +229,6 @@ def _report(
     outside: "dict[str, Prediction]",
 ) -> dict[str, Any]:
     from e2efly.alignment.found import nuisances
-    from e2efly.alignment.windows import STEP
 
     def entry(e: "Estimate") -> dict[str, Any]:
         return {"value": e.value.tolist(), "sigma": e.sigma.tolist(), "source": e.source}
@@ -243,7 +242,6 @@ def _report(
     }
     for kind, each in found.items():
         held_out, ahead = outside[kind], [x for x in AHEAD if x <= each.windows.length]
-        at = [round(x / STEP) for x in ahead]
         covariance = each.fit.covariance
         spread = np.sqrt(np.diag(covariance))
         report[kind] = {
@@ -260,7 +258,9 @@ def _report(
                 for label, other in each.structures.items()
             },
             "noise": {name: value for part in each.parts for name, value in part.noise.items()},
-            "misfit": [{"sensor": m.sensor, "share": m.share, "growth": m.growth} for m in each.misfits],
+            "misfit": [
+                {"sensor": m.sensor, "share": m.share, "growth": m.growth, "alarming": m.alarming} for m in each.misfits
+            ],
             "response": None
             if each.response is None
             else [
@@ -272,8 +272,8 @@ def _report(
             "held_out": {
                 name: {
                     "seconds": ahead,
-                    "before": held_out.before[name][at].tolist(),
-                    "after": held_out.after[name][at].tolist(),
+                    "before": finite(held_out.at(held_out.before[name], ahead).tolist()),
+                    "after": finite(held_out.at(held_out.after[name], ahead).tolist()),
                 }
                 for name in held_out.before
             },

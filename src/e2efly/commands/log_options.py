@@ -49,9 +49,12 @@ def show_notes(records: "Sequence[Record]", console: Console, known: "Sequence[R
 
 
 def read_checked(
-    files: "Sequence[Path]", reading: "LogReading", vehicle: "Vehicle", console: Console
+    files: "Sequence[Path]", reading: "LogReading", vehicle: "Vehicle", console: Console, hovers: bool = False
 ) -> "list[Record]":
     """The flights of these logs, checked against the vehicle; what was left out, changed and found is printed.
+
+    With `hovers`, all of a log without rotor speeds and motor outputs counts as flown.
+
 
     Raises:
         ValueError: naming the log, what is wrong with it, and what is accepted.
@@ -62,7 +65,7 @@ def read_checked(
 
     read = with_blackboxes([record for path in files for record in read_part(path, reading)])
     show_notes(read, console)
-    records = checked(read, vehicle)
+    records = checked(read, vehicle, hovers)
     show_notes(records, console, read)
     for record in records:
         rates = ", ".join(f"{name} {stream.rate:.0f} Hz" for name, stream in record.streams.items())

@@ -68,13 +68,13 @@ def _plot_prediction(path: Path, each: Found, outside: Prediction) -> None:
     with figure(path, "Foretelling what was not seen", 0.9 + 2.1 * -(-len(names) // 3), notes) as fig:
         for i, name in enumerate(names):
             ax = fig.add_subplot(-(-len(names) // 3), 3, i + 1)
-            there = outside.before[name] > 0  # a slow stream has no sample after some times
+            there = np.isfinite(outside.before[name])  # a slow stream has no sample after some times
             ax.plot(outside.time[there], outside.before[name][there], color=GREY, label="by the file")
             ax.plot(outside.time[there], outside.after[name][there], color=BLUE, label="identified")
             ax.set_title(_NAMES[name])
             ax.set_ylabel(UNITS[name])
             ax.set_xlabel("time ahead (s)")
-            ax.set_ylim(0, float(np.quantile(outside.before[name], 0.98)) * 1.3 + 1e-9)
+            ax.set_ylim(0, float(np.quantile(outside.before[name][there], 0.98)) * 1.3 + 1e-9)
             if i == 0:
                 ax.legend(loc="upper left")
 
