@@ -194,7 +194,7 @@ def _bounded(stream: Any, fields: int, markers: frozenset[str]) -> Any:
 
 def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
     for guess in _GUESSED:
-        parser.sys_config.pop(guess)
+        parser.sys_config.pop(guess, None)
     parser.parse_header()
     names, header = parser.main_field_names, parser.sys_config
     most = max(frame["count"] for frame in parser.frame_defs.values())
@@ -280,12 +280,12 @@ def _grouped(names: Iterable[str], used: Iterable[str]) -> tuple[str, ...]:
 
 def _volts(header: Mapping[str, Any]) -> float:
     """One count of `vbatLatest`, V. 0: not known."""
-    kind, version = header["firmwareType"], tuple(map(int, str(header["firmwareVersion"]).split(".")))
+    kind, version = header.get("firmwareType"), tuple(map(int, str(header.get("firmwareVersion", 0)).split(".")))
     if kind == "betaflight" and version >= (4,):
         return 0.01
     if (kind == "betaflight" and version >= (3, 1)) or (kind == "cleanflight" and version >= (2,)):
         return 0.1
-    return _COUNT * float(header["vbatscale"]) if kind in ("betaflight", "cleanflight", "baseflight") else 0.0
+    return _COUNT * float(header.get("vbatscale", 0)) if kind in ("betaflight", "cleanflight", "baseflight") else 0.0
 
 
 def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> LogClock:
