@@ -94,11 +94,11 @@ def _means(values: np.ndarray, every: int) -> np.ndarray:
 
 def setpoint_delay(record: Record) -> float | None:
     """The time from the sending of a command until it is the setpoint of the rate loop, s. None: the record does not
-    show it.
+    show it, as where its commands are only the setpoints.
 
     It is the delay at which the commands, each held until the next, explain the setpoints best.
     """
-    if not record.has("command", "setpoint"):
+    if not record.has("command", "setpoint") or not np.ptp(record.streams["command"].values[:, 0]):
         return None
     command, setpoint = record.streams["command"], record.streams["setpoint"]
     first, last = command.time[0] + TRIED[-1], command.time[-1] + TRIED[0]

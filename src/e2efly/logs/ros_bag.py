@@ -109,7 +109,7 @@ PX4 = {f"px4_msgs/msg/{''.join(map(str.capitalize, each.topic.split('_')))}": ea
 """The topics of PX4 by the types of messages that carry them."""
 TWIST, COMMAND, TARGET = "geometry_msgs/msg/TwistStamped", "/command", "mavros_msgs/msg/AttitudeTarget"
 POSES = ("position", "quaternion", "velocity")
-"""These come from one topic: two topics may have two worlds."""
+"""These come from one topic, or from PX4's own: other topics may have other worlds."""
 
 
 @dataclass
@@ -288,10 +288,11 @@ def _choose(known: list["_Series"], topics: Sequence[str], streams: Streams) -> 
         name, before = series.topic.name, set(streams.found)
         if series.damaged:
             streams.notes.append(f"{series.damaged} messages of {name} cannot be decoded and are left out")
-        apart = posed and name not in topics
-        series.put(streams, [] if not apart else POSES)
+        world = "PX4's" if series.topic.kind in PX4 else name
+        apart = posed not in ("", world) and name not in topics
+        series.put(streams, POSES if apart else [])
         taken = [stream for stream in streams.found if stream not in before]
-        posed = posed or (name if set(taken) & set(POSES) else "")
+        posed = posed or (world if set(taken) & set(POSES) else "")
         left = [stream for stream in series.offered if stream not in taken]
         told = f"; its {listed(left)} would be taken with --topics {name}" if left else ""
         streams.notes.append(f"{listed(taken) or 'nothing'} from {name}{told}")

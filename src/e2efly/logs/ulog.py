@@ -73,7 +73,7 @@ def _attitude(q: np.ndarray) -> np.ndarray:
     w, x, y, z = q.T
     # half turns: about (1, 1, 0) / sqrt 2 from NED to ENU, about x from FLU to FRD
     s = np.sqrt(0.5)
-    a, b, c, d = -s * (x + y), s * (w + z), s * (w - z), s * (x - y)  # ENU * q
+    a, b, c, d = -s * (x + y), s * (w + z), s * (w - z), s * (y - x)  # ENU * q
     return np.stack([-b, a, d, -c], -1)  # ... * FLU
 
 
