@@ -15,7 +15,7 @@ from rosbags.typesys import get_types_from_msg
 from scipy.spatial.transform import Rotation
 
 from e2efly.logs.recording import Record, Stream
-from e2efly.logs.ros_bag import OWN, _store
+from e2efly.logs.ros_bag import _store
 from e2efly.logs.scripts.ros_messages import encoded, full_name
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
@@ -26,6 +26,13 @@ CRAZYFLIE = (1, 0, 2, 3)
 """Our rotors in a Crazyflie's order: front right, rear right, rear left, front left."""
 ELSE = (2, 0, 1, 3)
 """Our rotors in an order of somebody who wired them as he liked."""
+PLACES = ((-0.1, 0.1), (0.1, 0.1), (-0.1, -0.1), (0.1, -0.1))
+"""Of our rotors, forward and to the right, m."""
+MOTIONS = (
+    "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_local_position", "vehicle_attitude",
+    "vehicle_rates_setpoint", "battery_status",
+)  # fmt: skip
+"""Topics of PX4 that have no rotors in them."""
 FLIP = np.array([1.0, -1.0, -1.0])
 RPM = 60 / (2 * math.pi)
 
@@ -38,7 +45,7 @@ def with_outputs(record: Record, exact: Record, body: Vehicle) -> Record:
     time = speed.time[speed.time > sent.time[0] + body.latency]
     asked = sent.values[np.searchsorted(sent.time, time - body.latency, side="right") - 1, 1:]
     more = {
-        "motor": Stream(speed.time, np.clip(driven / body.rotor_speed_max, 0.0, 1.0)),
+        "motor": Stream(speed.time, np.clip(driven / body.full_rotor_speed, 0.0, 1.0)),
         "setpoint": Stream(time, asked),
         "voltage": Stream(speed.time[::25], np.full((len(speed.time[::25]), 1), 16.07)),
     }
@@ -59,10 +66,6 @@ def _turned(quaternion: np.ndarray) -> np.ndarray:
     return turned.as_quat()[:, [3, 0, 1, 2]]
 
 
-Topic = tuple[str, int, Stream, dict[str, Any]]
-"""Of PX4: name, instance, times and numbers, and the fields that they make: a form, and the columns."""
-
-
 def px4_topics(record: Record, order: Sequence[int]) -> dict[str, tuple[str, Stream]]:
     """By PX4's topic, its fields, and its numbers. An array takes as many as it has entries."""
     found = record.streams
@@ -71,9 +74,12 @@ def px4_topics(record: Record, order: Sequence[int]) -> dict[str, tuple[str, Str
         return Stream(found[name].time, turn(found[name].values))
 
     place = of("position", _ned)
+    force = of("specific_force", lambda x: x * FLIP)
+    both = Stream(force.time, np.hstack([force.values, np.zeros_like(force.values)]))
     motion = Stream(place.time, np.hstack([place.values, _ned(found["velocity"].values)]))
     return {
         "vehicle_angular_velocity": ("float[3] xyz", of("body_rate", lambda x: x * FLIP)),
+        "sensor_combined": ("float[3] accelerometer_m_s2;float[3] gyro_rad", both),
         "vehicle_acceleration": ("float[3] xyz", of("specific_force", lambda x: x * FLIP)),
         "vehicle_local_position": ("float x;float y;float z;float vx;float vy;float vz", motion),
         "vehicle_attitude": ("float[4] q", of("quaternion", _turned)),
@@ -86,9 +92,19 @@ def px4_topics(record: Record, order: Sequence[int]) -> dict[str, tuple[str, Str
 
 
 def as_ulog(
-    path: Path, record: Record, topics: Sequence[str], parameters: Mapping[str, float], order: Sequence[int] = PX4
+    path: Path,
+    record: Record,
+    topics: Sequence[str],
+    parameters: Mapping[str, float],
+    order: Sequence[int] = PX4,
+    turned: Sequence[int] = (0, 1, 2, 3),
+    idle: str = "",
 ) -> Path:
-    """A log of PX4 with these of its topics. PX4's own reader reads and writes it, so that it is one of its kind."""
+    """A log of PX4 with these of its topics. PX4's own library reads and writes it, so that it is one of its kind.
+
+    `turned`: the motors that the ESCs turn, one after the other. `idle`: a topic that has an instance before the one
+    that moves.
+    """
 
     def message(kind: bytes, content: bytes) -> bytes:
         return struct.pack("<Hc", len(content), kind) + content
@@ -103,14 +119,17 @@ def as_ulog(
         number = struct.pack("<i" if isinstance(value, int) else "<f", value)
         parts.append(message(b"P", bytes([len(key)]) + key + number))
     samples = []
-    for number, topic in enumerate(topics):
-        parts.append(message(b"A", struct.pack("<BH", 0, number) + topic.encode()))
+    numbered = [(topic, 0, topic == idle) for topic in topics] + [(idle, 1, False)] * bool(idle)
+    for number, (topic, instance, still) in enumerate(numbered):
+        parts.append(message(b"A", struct.pack("<BH", instance, number) + topic.encode()))
         stream = known[topic][1]
+        if still:
+            stream = Stream(stream.time, np.full_like(stream.values, 900.0))
         for t, row in zip(stream.time, stream.values, strict=True):
             stamp = round(1e6 * (t + 1))
             data = struct.pack("<HQ", number, stamp)
             if topic == "esc_status":
-                data += b"".join(struct.pack("<QiB", stamp, round(x), 101 + i) for i, x in enumerate(row))
+                data += b"".join(struct.pack("<QiB", stamp, round(row[i]), 101 + i) for i in turned)
             else:
                 data += struct.pack(f"<{len(row)}f", *row)
             samples.append((stamp, message(b"D", data)))
@@ -223,9 +242,6 @@ def as_bag(path: Path, rows: Rows, record: Record | None = None) -> Path:
     return path
 
 
-assert OWN  # the store of `_store` has mavros' types
-
-
 # Betaflight
 
 
@@ -241,11 +257,12 @@ def _signed(number: int) -> bytes:
     return _unsigned(number << 1 if number >= 0 else (-number << 1) - 1)
 
 
-def blackbox_session(
-    record: Record, version: str, poles: int | None = 14, motors: int = 4, fine: bool = False
-) -> bytes:
+def as_blackbox(
+    path: Path, record: Record, version: str, poles: int | None = 14, motors: int = 4, fine: bool = False
+) -> Path:
     """A session as Betaflight of this version logs it: setpoints from 4.0, rotor speeds from 4.5 on. Every frame is
-    whole, which its format allows. The gyroscope is in deg/s, or in tenths if it is `fine`."""
+    whole, which its format allows. The gyroscope is in deg/s, or in tenths if it is `fine`.
+    """
     found, numbers = record.streams, tuple(map(int, version.split(".")))
     setpoints, speeds, unit = numbers >= (4,), numbers >= (4, 5), 10 if fine else 1
     names = [*(f"{name}[{i}]" for name in ("rcCommand", "gyroADC", "accSmooth") for i in range(3)), "vbatLatest"]
@@ -284,7 +301,8 @@ def blackbox_session(
     frames = []
     for i, (t, row) in enumerate(zip(time, np.rint(np.hstack(columns)).astype(int).tolist(), strict=True)):
         frames.append(b"I" + _unsigned(i) + _unsigned(round(1e6 * t)) + b"".join(map(_signed, row)))
-    return head.encode() + b"".join(frames) + b"E\xffEnd of log\0"
+    path.write_bytes(head.encode() + b"".join(frames) + b"E\xffEnd of log\0")
+    return path
 
 
 # Crazyflie
