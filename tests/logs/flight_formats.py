@@ -38,14 +38,16 @@ RPM = 60 / (2 * math.pi)
 
 
 def with_outputs(record: Record, exact: Record, body: Vehicle) -> Record:
-    """The record with the outputs that led to its rotor speeds, the body rates that the rate loop was asked for, and a
-    battery."""
+    """The record with the outputs that led to its rotor speeds (an output of u gives u (1 + u) / 2 of the thrust), the
+    body rates that the rate loop was asked for, and a battery.
+    """
     speed, sent = exact.streams["rotor_speed"], record.streams["command"]
     driven = speed.values + body.motor_time_constant * np.gradient(speed.values, speed.time, axis=0)
+    thrust = np.maximum(np.polyval(body.thrust_map, driven), 0.0)
     time = speed.time[speed.time > sent.time[0] + body.latency]
     asked = sent.values[np.searchsorted(sent.time, time - body.latency, side="right") - 1, 1:]
     more = {
-        "motor": Stream(speed.time, np.clip(driven / body.full_rotor_speed, 0.0, 1.0)),
+        "motor": Stream(speed.time, np.clip(np.sqrt(0.25 + 2 * thrust / body.thrust_range[1]) - 0.5, 0.0, 1.0)),
         "setpoint": Stream(time, asked),
         "voltage": Stream(speed.time[::25], np.full((len(speed.time[::25]), 1), 16.07)),
     }

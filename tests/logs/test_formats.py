@@ -237,7 +237,7 @@ def test_rotor_speeds_of_a_blackbox_are_laid_over_a_flight(tmp_path: Path, recor
 def test_a_vehicle_is_identified_from_its_log(
     tmp_path: Path, record: Record, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Thrust within 3 % and, of commands, the delay within 3 ms. Setpoints alone do not tell when commands were sent."""
+    """Thrust within 3 %, the delay within 3 ms. Setpoints alone do not tell when commands were sent."""
     monkeypatch.setattr("e2efly.viewing.style.DPI", 30)
     log, out = LOGS[name](tmp_path, record), tmp_path / "out"
     assert run(["identify", "flight", str(log), "--mass", "0.9", "0.001", "--out", str(out)]) == 0
@@ -252,7 +252,7 @@ def test_a_vehicle_is_identified_from_its_log(
 def test_a_vehicle_is_aligned_with_its_log(
     tmp_path: Path, record: Record, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The rate loop answers with its gain times the thrust that is there. A blackbox shows no delay before its setpoints."""
+    """The rate loop answers with its gain times the thrust that there is. A blackbox shows no delay."""
     monkeypatch.setattr("e2efly.viewing.style.DPI", 30)
     log, out = LOGS[name](tmp_path, record), tmp_path / "out"
     assert run(["align", str(log), "--out", str(out)]) == 0
