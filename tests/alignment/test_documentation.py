@@ -13,10 +13,11 @@ import pytest
 from e2efly.alignment import parts
 from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
-from e2efly.validation.plant_excitation import Sensors
+from e2efly.validation.plant_excitation import PERFECT, Sensors
 from e2efly.vehicles.loading import load_vehicle
 from tests.alignment.flights import FILE, as_mcap, flown
 from tests.alignment.test_stand import write
+from tests.logs.flight_formats import MOTIONS, as_blackbox, as_ulog, with_outputs
 
 PAGE = Path(__file__).parents[2] / "docs" / "identification.md"
 FIRMWARE = ".BBL"
@@ -73,6 +74,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
         entries[column] = f"{float(entries[column]) / 9.81:.8g}" if entries[column] else ""
         lines[i] = ",".join(entries)
     (folder / "theirs.csv").write_text("\n".join(lines) + "\n")
+    driven = with_outputs(record, flown(body, 6.0, PERFECT), body)
+    as_ulog(folder / "px4.ulg", driven, (*MOTIONS, "esc_status"), {})
+    session = as_blackbox(folder / "LOG00002.TXT", driven, "4.5").read_bytes()
+    (folder / "LOG00002.TXT").write_bytes(2 * session)
     return folder
 
 

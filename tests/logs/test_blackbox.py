@@ -80,3 +80,18 @@ def test_motor_outputs_of_a_blackbox_are_what_the_escs_are_told() -> None:
     assert np.allclose(session.output, 0.055 + 0.945 * session.motor)
     (record,) = read_flights(DATA / "sitl.bfl")
     assert record.streams["motor"].values.min() >= 0.055
+
+
+def test_commands_that_are_made_of_setpoints_show_no_delay() -> None:
+    (found,) = with_blackboxes([flight(), box()])
+    setpoint = found.streams["setpoint"]
+    rates = np.column_stack([np.full(len(setpoint.time), 9.81), setpoint.values])
+    assert setpoint_delay(Record(Path("c"), {**found.streams, "command": Stream(setpoint.time, rates)})) is None
+
+
+def test_the_gyroscope_has_the_scale_of_the_header(tmp_path: Path) -> None:
+    """Half a degree per second in a count, as the hexadecimal digits of a number of 32 bits."""
+    data = (DATA / "sitl.bfl").read_bytes()
+    (tmp_path / "a.bbl").write_bytes(data.replace(b"gyro_scale:0x3f800000", b"gyro_scale:0x3f000000"))
+    (half,), (whole,) = read_blackbox(tmp_path / "a.bbl"), read_blackbox(DATA / "sitl.bfl")
+    assert np.allclose(half.gyro, 0.5 * whole.gyro) and np.ptp(whole.gyro) > 0.1

@@ -89,7 +89,7 @@ class Logged:
             "frameIntervalPNum": 1, "frameIntervalPDenom": 8, "blackbox_high_resolution": 1, "debug_mode": self.debug,
             "motorOutput": (1000, 2000),
         }  # fmt: skip
-        self.frame_defs, self.stream = {"I": {"count": len(self.main_field_names)}}, self
+        self.frame_defs, self.stream = {"I": {"count": len(self.main_field_names), "name": self.main_field_names}}, self
         self.pos, self.main_frames = 0, []
 
     def parse_header(self) -> None:

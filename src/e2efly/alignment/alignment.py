@@ -173,11 +173,7 @@ def _aligned(
 
 
 def _link(record: Record) -> tuple[float, float] | None:
-    """The time from a command to the setpoint, s, and its standard deviation. None: the log does not show it, as where
-    its commands are only the setpoints.
-    """
-    if not record.has("command") or not np.ptp(record.streams["command"].values[:, 0]):
-        return None
+    """The time from a command to the setpoint, s, and its standard deviation. None: the log does not show it."""
     late = setpoint_delay(record)
     # between two samples, every time is equally likely
     return None if late is None else (late, float(np.hypot(DELAY_SIGMA, 1 / record.streams["setpoint"].rate / 12**0.5)))

@@ -26,6 +26,9 @@ class LogOptions:
     """Topics of ROS bags that are taken before all others. The notes on a log say which topics were taken."""
     without: tuple[str, ...] = ()
     """Streams that are left out, such as rotor_speed."""
+    sessions: tuple[int, ...] = ()
+    """Numbers of the sessions of a blackbox that are read, as its notes give them, from 1. Each is a flight. All unless
+    given."""
 
     def reading(self, known: "Collection[str] | None" = None) -> "LogReading":
         """The options, checked. `known`: our names of columns; those of flights unless given.
@@ -36,7 +39,8 @@ class LogOptions:
         from e2efly.logs.csv_file import COLUMNS, column_map
         from e2efly.logs.readers import LogReading
 
-        return LogReading(column_map(self.columns, COLUMNS if known is None else known), self.topics, self.without)
+        columns = column_map(self.columns, COLUMNS if known is None else known)
+        return LogReading(columns, self.topics, self.without, self.sessions)
 
 
 def show_notes(records: "Sequence[Record]", console: Console, known: "Sequence[Record]" = ()) -> None:

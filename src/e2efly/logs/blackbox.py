@@ -2,19 +2,23 @@
 
 They are decoded by the package `betaflight-chirp-core`. The firmware (4.6; found by feeding it known body rates) logs
 gyro and setpoint in deg/s (in tenths with `blackbox_high_resolution`), with the signs of FLU: roll to the right, nose
-down and yaw to the left are positive. Motors are in the range of the header `motorOutput`. Time is in us since the
-controller started.
+down and yaw to the left are positive. Its estimator of attitudes takes the accelerometer in the same axes, where it
+shows the reaction to gravity: at rest, z is the header's `acc_1G`. Motors are in the range of the header `motorOutput`.
+`eRPM` is in hundreds of electrical revolutions per minute. The battery is in hundredths of a volt from Betaflight 4.0
+on, in tenths from 3.1 on, and in counts of the converter before. Time is in us since the controller started.
 """
 
 import math
 from array import array
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from e2efly.vehicles.gravity import GRAVITY
 
 WINDOW = 1.0
 """Length of the pieces that are aligned, s."""
@@ -32,7 +36,8 @@ of Betaflight has some 40 fields."""
 _WORK, _FIELDS_A_BYTE = 500_000, 16  # fields decoded per byte; a whole log has one per byte, a damaged one many
 _WANTED = (
     "time", *(f"gyroADC[{i}]" for i in range(3)), *(f"setpoint[{i}]" for i in range(3)),
-    *(f"motor[{i}]" for i in range(4)),
+    *(f"motor[{i}]" for i in range(4)), *(f"accSmooth[{i}]" for i in range(3)), *(f"eRPM[{i}]" for i in range(4)),
+    "vbatLatest",
 )  # fmt: skip
 TERMS = {"P": "axisP", "I": "axisI", "D": "axisD", "F": "axisF"}
 """Terms of the rate loop by name, with the fields that log them."""
@@ -41,6 +46,9 @@ _SCALED = 6  # the debug mode GYRO_SCALED: the gyro before its filters, deg/s
 _WHOLE = 1000.0  # a term that alone asks for the full range of the mixer
 _TOLD = 3  # reasons that an error or a note tells
 _STEP = 1000  # largest denominator of the share of loops that are logged
+_ERPM = 100 * 2 * math.pi / 60  # rad/s of the field, in a count of `eRPM`
+_COUNT = 3.3 / 4095 / 10  # V at the converter, in a count, over the tenths of `vbatscale`
+_GUESSED = ("gyroScale", "acc_1G", "motor_poles")  # headers for which the decoder has values of its own
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,16 @@ class Blackbox:
     reach: tuple[float, float] = (0.0, 1.0)
     """The ESC commands at which `motor` is 0 and 1. Here 0 is 1000 us or DShot's 48, and 1 is 2000 us or DShot's
     2047."""
+    force: np.ndarray | None = None
+    """(n, 3) specific force, FLU, m/s^2, as the flight controller filters it. None if it was not logged."""
+    rotor_speed: np.ndarray | None = None
+    """(n, 4) speeds of the rotors, rad/s, in Betaflight's order. None if they were not logged."""
+    voltage: np.ndarray | None = None
+    """(n, 1) of the battery, V. None if it was not logged."""
+    motors: int = 4
+    """How many motor outputs were logged."""
+    unused: tuple[str, ...] = ()
+    """Fields of the log that are not read."""
     notes: tuple[str, ...] = ()
     """What was not read, in words."""
 
@@ -91,12 +109,14 @@ class LogClock:
     """How much faster the blackbox's clock runs over the overlap, as a ratio minus 1."""
 
 
-def read_blackbox(path: str | Path, tuning: bool = False) -> list[Blackbox]:
+def read_blackbox(path: str | Path, tuning: bool = False, numbers: Sequence[int] = ()) -> list[Blackbox]:
     """The sessions of a blackbox log that have frames: at most `SESSIONS`, with at most `FRAMES` frames each. With
-    `tuning`, also the unfiltered gyro and the terms of the rate loop.
+    `tuning`, also the unfiltered gyro and the terms of the rate loop. With `numbers`, the sessions with these numbers,
+    from 1, alone.
 
     Raises:
-        ValueError: if there is no such file, no session with gyro data in it, or no decoder.
+        ValueError: if there is no such file, no session with gyro data in it, no session of these numbers, or no
+            decoder.
     """
     path = Path(path)
     if not path.is_file():
@@ -107,17 +127,23 @@ def read_blackbox(path: str | Path, tuning: bool = False) -> list[Blackbox]:
         missing = f"the package betaflight-chirp-core is missing ({error})"
         raise ValueError(f"blackbox log: {missing}; accepted: pip install 'e2efly[blackbox]'") from None
     data = path.read_bytes()
-    places = decoder.split_sessions(data)
+    places = dict(enumerate(decoder.split_sessions(data), 1))
+    if missing := [number for number in numbers if number not in places]:
+        raise ValueError(f"{path}: has no session {missing[0]}; accepted: a session from 1 to {len(places)}")
+    asked = [number for number in places if number in numbers or not numbers]
     sessions: list[Blackbox] = []
     reasons: list[str] = []
-    for number, (start, end) in enumerate(places[:SESSIONS], 1):
+    for number in asked[:SESSIONS]:
+        start, end = places[number]
         try:
             sessions.append(_session(decoder.FlightLogParser(data, start, end), number, tuning))
         except Exception as error:  # the decoder trusts its input: one bad session must not affect the others
             reasons.append(f"session {number}: {type(error).__name__}: {error}")
     told = reasons[:_TOLD] + ([f"{len(reasons) - _TOLD} more without frames"] if len(reasons) > _TOLD else [])
-    if len(places) > SESSIONS:
-        told.append(f"only the first {SESSIONS} of {len(places)} sessions are read")
+    if len(asked) > SESSIONS:
+        told.append(f"only the first {SESSIONS} of {len(asked)} sessions are read")
+    if len(asked) < len(places):
+        told.append(f"{len(places) - len(asked)} of {len(places)} sessions, as asked")
     if not sessions:
         why = "; ".join(told) or "no session in it"
         raise ValueError(f"{path}: no blackbox log that can be read ({why}); accepted: a Betaflight .bbl or .bfl file")
@@ -167,6 +193,8 @@ def _bounded(stream: Any, fields: int, markers: frozenset[str]) -> Any:
 
 
 def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
+    for guess in _GUESSED:
+        parser.sys_config.pop(guess, None)
     parser.parse_header()
     names, header = parser.main_field_names, parser.sys_config
     most = max(frame["count"] for frame in parser.frame_defs.values())
@@ -180,22 +208,22 @@ def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
     parser.main_frames = kept = _Frames(names, tuning)
     parser.gps_frames, parser.slow_frames, parser.events = deque(maxlen=0), deque(maxlen=0), deque(maxlen=0)
     parser.stream = _bounded(parser.stream, most, frozenset(parser.frame_defs))
-    notes = ()
+    notes: list[str] = []
     try:
         parser.parse_data()
     except _EnoughError as enough:
-        notes = (str(enough),)
+        notes.append(str(enough))
     if not len(kept):
-        raise ValueError(*(notes or ("no frames",)))
+        raise ValueError(*(notes or ["no frames"]))
     frames = kept.table()
     latest = np.maximum.accumulate(frames[:, 0])
     rising = np.concatenate([[True], frames[1:, 0] > latest[:-1]])
     if not rising.all():
-        notes += (f"{int((~rising).sum())} frames out of {len(frames)} whose time does not rise are left out",)
+        notes.append(f"{int((~rising).sum())} frames out of {len(frames)} whose time does not rise are left out")
     frames = frames[rising]
 
     def columns(name: str, count: int) -> np.ndarray:
-        keys = [f"{name}[{i}]" for i in range(count)]
+        keys = [f"{name}[{i}]" for i in range(count)] if count > 1 else [name]
         known = all(key in kept.fields for key in keys)
         return frames[:, [kept.fields.index(key) for key in keys]] if known else np.full((len(frames), count), np.nan)
 
@@ -210,9 +238,23 @@ def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
     low, high = map(float, header["motorOutput"])
     time = frames[:, 0]
     least, most = (48.0, 2047.0) if low < 1000 else (1000.0, 2000.0)
+    gyro = fine * float(header.get("gyroScale", math.radians(1e-6))) * 1e6  # rad/s, in a count
+
+    def measured(name: str, count: int, unit: float, why: str) -> np.ndarray | None:
+        found = columns(name, count)
+        if np.isnan(found).any():
+            return None
+        if not unit:
+            notes.append(f"{name} is left out: {why}")
+            return None
+        return found * unit
+
+    unsaid = "the header does not say {}"
+    one, poles = (float(header.get(name, 0)) for name in ("acc_1G", "motor_poles"))
+    others = {name for kind, frame in parser.frame_defs.items() if kind != "P" for name in frame["name"]}
     return Blackbox(
         time=(time - time[0]) * 1e-6,
-        gyro=np.radians(columns("gyroADC", 3) * fine),
+        gyro=columns("gyroADC", 3) * gyro,
         setpoint=np.radians(columns("setpoint", 3) * fine),
         motor=(columns("motor", 4) - low) / max(high - low, 1.0),
         firmware=str(header.get("Firmware revision") or "unknown"),
@@ -220,8 +262,30 @@ def _session(parser: Any, number: int, tuning: bool) -> Blackbox:
         unfiltered=None if raw is None else np.radians(raw * fine),
         terms={name: values / _WHOLE for name, values in terms.items() if values is not None},
         reach=((low - least) / (most - least), (high - least) / (most - least)),
-        notes=notes,
+        force=measured("accSmooth", 3, GRAVITY / one if one > 0 else 0.0, unsaid.format("acc_1G")),
+        rotor_speed=measured("eRPM", 4, 2 * _ERPM / poles if poles > 0 else 0.0, unsaid.format("motor_poles")),
+        voltage=measured("vbatLatest", 1, _volts(header), "its unit in this firmware is not known"),
+        motors=sum(name.startswith("motor[") for name in names),
+        unused=_grouped(others - {"time", *kept.fields}, kept.fields),
+        notes=tuple(notes),
     )
+
+
+def _grouped(names: Iterable[str], used: Iterable[str]) -> tuple[str, ...]:
+    """Names of fields, sorted. Fields such as `axisP[0]` and `axisP[1]` go by `axisP`, unless some of them are used."""
+    apart = {name.partition("[")[0] for name in used}
+    groups = ((name, name.partition("[")[0]) for name in names)
+    return tuple(sorted({name if group in apart else group for name, group in groups}))
+
+
+def _volts(header: Mapping[str, Any]) -> float:
+    """One count of `vbatLatest`, V. 0: not known."""
+    kind, version = header.get("firmwareType"), tuple(map(int, str(header.get("firmwareVersion", 0)).split(".")))
+    if kind == "betaflight" and version >= (4,):
+        return 0.01
+    if (kind == "betaflight" and version >= (3, 1)) or (kind == "cleanflight" and version >= (2,)):
+        return 0.1
+    return _COUNT * float(header.get("vbatscale", 0)) if kind in ("betaflight", "cleanflight", "baseflight") else 0.0
 
 
 def align(time: np.ndarray, gyro: np.ndarray, blackbox: Blackbox) -> LogClock:

@@ -1,8 +1,8 @@
 """A flight controller's blackbox, merged into the flight log of the same flight.
 
 The flight log of e2efly has the commands, the poses and 50 gyroscope samples per second. The blackbox has the
-gyroscope, the motor outputs and the setpoint of the rate loop a thousand times per second. Together they show more than
-each alone.
+gyroscope, the motor outputs and the setpoint of the rate loop a thousand times per second, and may have the speeds of
+the rotors. Together they show more than each alone.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from e2efly.logs.blackbox import Blackbox, align
 from e2efly.logs.readers import BLACKBOX
-from e2efly.logs.recording import Record, Stream
+from e2efly.logs.recording import Record, Stream, listed
 
 RATE = 1000.0
 """Sampling rate to which a blackbox is reduced by averaging, Hz."""
@@ -23,6 +23,8 @@ TRIED = np.arange(-0.05, 0.2, 5e-4)
 with 50 Hz data."""
 DELAY_SIGMA = 1.5e-3
 """Standard deviation of a delay that is measured in this way, s. It comes from the matching of the clocks."""
+OVER, BESIDES = ("body_rate", "motor", "setpoint"), ("rotor_speed", "specific_force", "voltage")
+"""Streams of a blackbox that replace those of the flight log, and those that are taken if the flight log has none."""
 ALIKE = 0.3
 """Largest fraction of the setpoint's variance that the commands may leave unexplained."""
 
@@ -54,11 +56,16 @@ def _laid(flight: Record, box: Record) -> Record | None:
     time = _even(told.time, laid.time, np.linalg.norm(told.values, axis=1))
     every = max(round(told.rate / RATE), 1)
     streams = {name: stream for name, stream in flight.streams.items() if name not in ("body_rate", "motor")}
-    for name in ("body_rate", "motor", "setpoint"):
-        if name in box.streams and len(box.streams[name].time) == len(time):
-            streams[name] = Stream(_means(time, every), _means(box.streams[name].values, every))
-    note = f"{box.path.name} is laid over it: body rates, motor outputs and setpoints are the blackbox's"
-    return replace(flight, streams=streams, notes=(*flight.notes, note))
+    taken = [name for name in (*OVER, *BESIDES) if name in box.streams and name not in {*streams} - {*OVER}]
+    for name in taken:
+        stream = box.streams[name]
+        at = np.interp(stream.time, told.time, time)
+        streams[name] = Stream(_means(at, every), _means(stream.values, every))
+    left = [name for name in BESIDES if name in box.streams and name not in taken]
+    besides = f"; its {listed(left)} is not used, as the flight log has its own" if left else ""
+    note = f"{box.path.name} is laid over it: {listed(taken)} from the blackbox{besides}"
+    notes = (f"{box.path.name}: {each}" for each in box.notes)
+    return replace(flight, streams=streams, notes=(*flight.notes, *notes, note))
 
 
 def _even(own: np.ndarray, laid: np.ndarray, lively: np.ndarray) -> np.ndarray:
@@ -87,11 +94,11 @@ def _means(values: np.ndarray, every: int) -> np.ndarray:
 
 def setpoint_delay(record: Record) -> float | None:
     """The time from the sending of a command until it is the setpoint of the rate loop, s. None: the record does not
-    show it.
+    show it, as where its commands are only the setpoints.
 
     It is the delay at which the commands, each held until the next, explain the setpoints best.
     """
-    if not record.has("command", "setpoint"):
+    if not record.has("command", "setpoint") or not np.ptp(record.streams["command"].values[:, 0]):
         return None
     command, setpoint = record.streams["command"], record.streams["setpoint"]
     first, last = command.time[0] + TRIED[-1], command.time[-1] + TRIED[0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.control import Quat
-from e2efly.logs.recording import Record, Streams, listed
+from e2efly.logs.recording import UNUSED, Record, Streams, listed
 from e2efly.vehicles.gravity import GRAVITY
 
 MAGIC = struct.pack("<BH", 0xBC, 2)
@@ -91,7 +91,7 @@ def read_crazyflie(path: Path) -> Record:
                     used |= {(number, field) for field in names}
     unused = [field for n, (_, fields) in events.items() for field, _ in fields if (n, field) not in used]
     if unused:
-        streams.notes.append(f"variables that are not used: {listed(unused)}")
+        streams.notes.append(f"variables that are not used: {listed(unused, UNUSED)}")
     return streams.record(path)
 
 

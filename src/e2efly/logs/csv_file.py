@@ -14,7 +14,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from e2efly.config.names import unknown
-from e2efly.logs.recording import HUGE, KINDS, Record, Stream, listed
+from e2efly.logs.recording import HUGE, KINDS, UNUSED, Record, Stream, listed
 from e2efly.vehicles.gravity import GRAVITY
 
 TIME = "t"
@@ -219,7 +219,7 @@ def _places(
     if len(found) == 1:
         raise ValueError(f"{path}: knows none of the columns {listed(header)}; accepted: {', '.join(COLUMNS)}")
     if unused := [text for i, text in enumerate(header) if i not in found.values()]:
-        notes.append(f"columns that are not used: {listed(unused)}")
+        notes.append(f"columns that are not used: {listed(unused, UNUSED)}")
     return found, np.array(factors)
 
 

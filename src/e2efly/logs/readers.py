@@ -1,7 +1,7 @@
 """Read flight logs of many formats into records. The first bytes of a file show its format, whatever its name is."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,7 +13,7 @@ from e2efly.logs import bag_storage, blackbox, crazyflie, ulog
 from e2efly.logs.csv_file import HEAD, Column, delimiter, encoding, read_csv
 from e2efly.logs.mcap_file import PROFILE
 from e2efly.logs.mcap_records import MAGIC, McapRecords
-from e2efly.logs.recording import KINDS, MOTORS, Record, Stream, Streams, listed, plain
+from e2efly.logs.recording import KINDS, MOTORS, UNUSED, Record, Stream, Streams, listed, plain
 from e2efly.logs.ros_bag import read_bag
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -36,6 +36,8 @@ class LogReading:
     """Topics of ROS bags that are taken before all others."""
     without: tuple[str, ...] = ()
     """Streams that are left out."""
+    sessions: tuple[int, ...] = ()
+    """Numbers of the sessions of a blackbox that are read, from 1. All unless given."""
 
     def __post_init__(self) -> None:
         """Check the names of the streams.
@@ -126,7 +128,9 @@ BLACKBOX, OURS = "a blackbox", "a flight log of e2efly"
 FORMATS = (
     Format(OURS, _is_ours, lambda path, _: [read_mcap(path)]),
     _BAG,
-    Format(BLACKBOX, lambda head: blackbox.START in head, lambda path, _: read_betaflight(path)),
+    Format(
+        BLACKBOX, lambda head: blackbox.START in head, lambda path, reading: read_betaflight(path, reading.sessions)
+    ),
     Format("a PX4 log", lambda head: head.startswith(ulog.MAGIC), lambda path, _: [ulog.read_ulog(path)]),
     Format(
         "a log of a Crazyflie's micro-SD deck",
@@ -150,6 +154,8 @@ def _finished(record: Record, reading: LogReading) -> Record:
             f"{LONGEST:g} s (one wrong time stamp may be the reason)"
         )
     streams, notes = dict(record.streams), list(record.notes)
+    if reading.sessions and record.kind != BLACKBOX:
+        notes.append(f"--sessions does not concern it: {record.kind} has one flight")
     for name in reading.without:
         if streams.pop(name, None) is not None:
             notes.append(f"{name} is left out, as asked")
@@ -270,20 +276,30 @@ def _asked(command: Stream, channels: "Series") -> np.ndarray:
     return best
 
 
-def read_betaflight(path: Path) -> list[Record]:
-    """The sessions of a blackbox: body rates, motor outputs and the requested body rates.
+def read_betaflight(path: Path, sessions: Sequence[int] = ()) -> list[Record]:
+    """The sessions of a blackbox, or those with these numbers.
 
     Raises:
-        ValueError: as for `read_blackbox`.
+        ValueError: as for `read_blackbox`. Also for a vehicle that is no quadrotor.
     """
     records = []
-    for session in blackbox.read_blackbox(path):
+    for session in blackbox.read_blackbox(path, numbers=sessions):
+        if session.motors not in (0, 4):
+            raise ValueError(
+                f"{path}: session {session.session} has outputs of {session.motors} motors; accepted: a quadrotor's 4"
+            )
         streams = Streams()
         streams.notes += [f"session {session.session}, {session.firmware:.60}", *session.notes]
-        for name, values in (("body_rate", session.gyro), ("motor", session.output), ("setpoint", session.setpoint)):
-            if np.isnan(values).all():
-                streams.notes.append(f"{name} was not logged")
-            else:
+        offered = {
+            "body_rate": session.gyro, "motor": session.output, "setpoint": session.setpoint,
+            "specific_force": session.force, "rotor_speed": session.rotor_speed, "voltage": session.voltage,
+        }  # fmt: skip
+        for name, values in offered.items():
+            if values is not None and not np.isnan(values).all():
                 streams.put(name, session.time, values)
+        if absent := [name for name in offered if name not in streams.found]:
+            streams.notes.append(f"the log has no {listed(absent)}")
+        if session.unused:
+            streams.notes.append(f"fields that are not used: {listed(session.unused, UNUSED)}")
         records.append(streams.record(path))
     return records

@@ -43,6 +43,8 @@ KINDS: dict[str, StreamKind] = {
 
 HUGE = 1e15
 """Numbers of this size and above are damage, in any unit."""
+UNUSED = 300
+"""Most names in a note on what a log has besides, and is not used."""
 MOTORS = 40.0
 """Lowest logging rate at which motor outputs can drive a simulation, Hz."""
 
@@ -126,7 +128,7 @@ class Streams:
             if count:
                 self.notes.append(f"{count} of {total} samples of {of} are left out: they {why}")
         time, values = time[rising], values[rising]
-        if name in ("rotor_speed", "quaternion") and len(time) and not values.any():
+        if name in ("rotor_speed", "quaternion", "specific_force") and len(time) and not values.any():
             self.notes.append(f"{of} is left out: it is always 0, so it was not measured")
         elif len(time):
             self.found[name] = Stream(time, values)

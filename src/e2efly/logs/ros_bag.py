@@ -13,9 +13,9 @@ import numpy as np
 from e2efly.config.names import unknown
 from e2efly.control import Quat, Vec3
 from e2efly.logs.bag_storage import BEGINNINGS, BagFile, BagTopic
-from e2efly.logs.recording import Record, Streams, listed
+from e2efly.logs.recording import UNUSED, Record, Streams, listed
 from e2efly.logs.scripts.ros_topics import BODY_FRAME
-from e2efly.logs.ulog import ORDER, RPM, TAKEN, TIMES, put_topic
+from e2efly.logs.ulog import ASSUMED, ORDER, ROTORS, RPM, TAKEN, fields_of, put_topic
 
 MESSAGES = 2_000_000
 """Largest number of messages that are decoded from a bag."""
@@ -77,18 +77,16 @@ def _target(message: Any) -> Row:
 def _pulses(message: Any) -> Row:
     if len(message.channels) < len(ORDER):
         return {}
-    return {"motor": [(float(message.channels[i]) - _PULSE[0]) / _PULSE[1] for i in ORDER]}
+    return {"motor": [max(float(message.channels[i]) - _PULSE[0], 0.0) / _PULSE[1] for i in ORDER]}
 
 
-def _escs(message: Any) -> Row:
-    if len(message.esc_status) < len(ORDER):
-        return {}
-    return {"rotor_speed": [message.esc_status[i].rpm * RPM for i in ORDER]}
+def _escs(told: Sequence[Any]) -> Row:
+    return {"rotor_speed": [abs(told[i].rpm) * RPM for i in ORDER]} if len(told) >= len(ORDER) else {}
 
 
 def _actuators(message: Any) -> Row:
     speeds = message.angular_velocities if hasattr(message, "angular_velocities") else message.velocity
-    return {"rotor_speed": [float(speeds[i]) for i in ORDER]} if len(speeds) >= len(ORDER) else {}
+    return {"rotor_speed": [abs(float(speeds[i])) for i in ORDER]} if len(speeds) >= len(ORDER) else {}
 
 
 TYPES: dict[str, Callable[[Any], Row]] = {
@@ -101,7 +99,8 @@ TYPES: dict[str, Callable[[Any], Row]] = {
     "geometry_msgs/msg/TwistStamped": _twist,
     "mavros_msgs/msg/AttitudeTarget": _target,
     "mavros_msgs/msg/RCOut": _pulses,
-    "mavros_msgs/msg/ESCStatus": _escs,
+    "mavros_msgs/msg/ESCStatus": lambda m: _escs(m.esc_status),
+    "mavros_msgs/msg/ESCTelemetry": lambda m: _escs(m.esc_telemetry),
     "mav_msgs/msg/Actuators": _actuators,
     "actuator_msgs/msg/Actuators": _actuators,
 }
@@ -110,7 +109,7 @@ PX4 = {f"px4_msgs/msg/{''.join(map(str.capitalize, each.topic.split('_')))}": ea
 """The topics of PX4 by the types of messages that carry them."""
 TWIST, COMMAND, TARGET = "geometry_msgs/msg/TwistStamped", "/command", "mavros_msgs/msg/AttitudeTarget"
 POSES = ("position", "quaternion", "velocity")
-"""These come from one topic: two topics may have two worlds."""
+"""These come from one topic, or from PX4's own: other topics may have other worlds."""
 
 
 @dataclass
@@ -177,7 +176,7 @@ class _Series:
 def _fields(message: Any, topic: str) -> dict[str, list[float]]:
     """The fields of a message of PX4 that are used, by their paths."""
     found = {}
-    for path in {*TIMES, *(name for each in TAKEN if each.topic == topic for name in each.fields)}:
+    for path in fields_of(topic):
         value = message
         for part in filter(None, re.split(r"[.\[]", path)):
             value = value[int(part[:-1])] if part.endswith("]") else getattr(value, part, None)
@@ -213,12 +212,14 @@ def read_bag(path: Path, topics: Sequence[str] = ()) -> Record:
     named = tuple(topic.name for topic in known)
     if missing := [name for name in topics if name not in named]:
         raise ValueError(f"{path}: --topics: {unknown('topic', missing[0], named)}")
-    unused = listed(f"{topic.name} ({why})" for topic, why in others.items())
+    unused = listed((f"{topic.name} ({why})" for topic, why in others.items()), UNUSED)
     if not known:
         accepted = ", ".join((*TYPES, *PX4))
         told = "".join(f"; {note}" for note in streams.notes)
         raise ValueError(f"{path}: has the topics {unused or 'none'}{told}; accepted: one of {accepted}")
     _choose(list(known.values()), topics, streams)
+    if streams.found.keys() & {*ROTORS}:
+        streams.notes.append(ASSUMED)
     if unused:
         streams.notes.append(f"topics that are not used: {unused}")
     return streams.record(path)
@@ -287,10 +288,11 @@ def _choose(known: list["_Series"], topics: Sequence[str], streams: Streams) -> 
         name, before = series.topic.name, set(streams.found)
         if series.damaged:
             streams.notes.append(f"{series.damaged} messages of {name} cannot be decoded and are left out")
-        apart = posed and name not in topics
-        series.put(streams, [] if not apart else POSES)
+        world = "PX4's" if series.topic.kind in PX4 else name
+        apart = posed not in ("", world) and name not in topics
+        series.put(streams, POSES if apart else [])
         taken = [stream for stream in streams.found if stream not in before]
-        posed = posed or (name if set(taken) & set(POSES) else "")
+        posed = posed or (world if set(taken) & set(POSES) else "")
         left = [stream for stream in series.offered if stream not in taken]
         told = f"; its {listed(left)} would be taken with --topics {name}" if left else ""
         streams.notes.append(f"{listed(taken) or 'nothing'} from {name}{told}")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from e2efly.logs.flight_log import mapped
-from e2efly.logs.recording import Record, Streams, listed
+from e2efly.logs.recording import UNUSED, Record, Streams, listed
 
 MAGIC = b"ULog\x01\x12\x35"
 """First bytes of a file."""
@@ -30,10 +30,24 @@ _TYPES = {
 }  # fmt: skip
 _LARGEST = 65_535  # bytes of a message
 _DEEPEST = 8  # formats within formats
+_FOUR = (0, 1, 2, 3)
 _FLIP = np.array([1.0, -1.0, -1.0])
 """Factors from FRD to FLU: forward stays, left is minus right, up is minus down."""
 ORDER = (3, 0, 1, 2)
-"""PX4's rotors in our order. PX4: front right, rear left, front left, rear right."""
+"""Rotors of a quadrotor X of PX4 and ArduPilot in our order. Theirs: front right, rear left, front left, rear right."""
+ASSUMED = (
+    "the rotors are taken to be numbered as PX4 and ArduPilot number those of a quadrotor X (front right, rear left, "
+    "front left, rear right); --columns takes another order, as m1=m2 m2=m1"
+)
+"""What a note says of a log that does not tell where its rotors are."""
+ROTORS = ("motor", "rotor_speed")
+"""Streams with a number for each rotor."""
+_QUADRANTS = ((-1, 1), (1, 1), (-1, -1), (1, -1))  # of our rotors: signs of their places, forward and right
+_CORNERS = ("rear right", "front right", "rear left", "front left")
+_QUADROTOR = 2  # of MAV_TYPE
+_PLUS = range(5000, 6000)  # of SYS_AUTOSTART before 1.14: quadrotors +
+_FIRST_MOTOR = 101  # number of the output function of motor 1
+_WIDTHS = (800.0, 2200.0)  # us: of pulses to an ESC that is armed
 
 
 class Taken(NamedTuple):
@@ -43,7 +57,7 @@ class Taken(NamedTuple):
     topic: str
     fields: tuple[str, ...]
     turn: Callable[[np.ndarray], np.ndarray]
-    """(n, k) PX4's numbers -> (n, k) ours."""
+    """(n, k) PX4's numbers -> (n, k) ours. Of rotors, in PX4's order still."""
 
 
 def _flip(x: np.ndarray) -> np.ndarray:
@@ -59,12 +73,26 @@ def _attitude(q: np.ndarray) -> np.ndarray:
     w, x, y, z = q.T
     # half turns: about (1, 1, 0) / sqrt 2 from NED to ENU, about x from FLU to FRD
     s = np.sqrt(0.5)
-    a, b, c, d = -s * (x + y), s * (w + z), s * (w - z), s * (x - y)  # ENU * q
+    a, b, c, d = -s * (x + y), s * (w + z), s * (w - z), s * (y - x)  # ENU * q
     return np.stack([-b, a, d, -c], -1)  # ... * FLU
 
 
 def _entries(name: str, entries: tuple[int, ...] = (0, 1, 2)) -> tuple[str, ...]:
     return tuple(name.format(i) for i in entries)
+
+
+def _shares(pulses: np.ndarray) -> np.ndarray:
+    """Pulses, us, as shares of the largest output. Without a pulse there is no output.
+
+    Raises:
+        ValueError: when they are no pulses.
+    """
+    least, most = _WIDTHS
+    there = pulses[np.nan_to_num(pulses) > 0]
+    if len(there) and not least <= np.min(there) <= np.max(there) <= most:
+        span = f"{np.min(there):g} to {np.max(there):g}"
+        raise ValueError(f"its outputs are {span}; accepted: pulses of {least:g} to {most:g} us, as 1000 to 2000")
+    return np.maximum((pulses - 1000) / 1000, 0.0)
 
 
 TAKEN = (
@@ -74,26 +102,63 @@ TAKEN = (
     Taken("specific_force", "sensor_combined", _entries("accelerometer_m_s2[{}]"), _flip),
     Taken("position", "vehicle_local_position", ("x", "y", "z"), _enu),
     Taken("velocity", "vehicle_local_position", ("vx", "vy", "vz"), _enu),
-    Taken("quaternion", "vehicle_attitude", _entries("q[{}]", (0, 1, 2, 3)), _attitude),
-    Taken("motor", "actuator_motors", _entries("control[{}]", ORDER), np.asarray),
-    Taken("rotor_speed", "esc_status", _entries("esc[{}].esc_rpm", ORDER), lambda x: x * RPM),
+    Taken("quaternion", "vehicle_attitude", _entries("q[{}]", _FOUR), _attitude),
+    Taken("motor", "actuator_motors", _entries("control[{}]", _FOUR), np.asarray),
+    Taken("motor", "actuator_outputs", _entries("output[{}]", _FOUR), _shares),
+    Taken("rotor_speed", "esc_status", _entries("esc[{}].esc_rpm", _FOUR), lambda x: np.abs(x) * RPM),
     Taken("setpoint", "vehicle_rates_setpoint", ("roll", "pitch", "yaw"), _flip),
     Taken("voltage", "battery_status", ("voltage_v",), np.asarray),
 )
-"""What is taken from PX4's topics. Of several that give a stream, the first that is there counts."""
+"""What is taken from PX4's topics. Of several that give a stream, that with the most samples counts in a log, else the
+first of these."""
 TIMES = ("timestamp_sample", "timestamp")
 """Fields with the time of a sample, us. The first that is there and not 0 counts."""
+FUNCTIONS = _entries("esc[{}].actuator_function", _FOUR)
+"""Fields that say which motor each ESC turns, from 1.13 on."""
 
 
-def put_topic(streams: Streams, topic: str, fields: Mapping[str, np.ndarray], without: Sequence[str] = ()) -> None:
+def fields_of(topic: str) -> set[str]:
+    """The fields of a topic that are used, by their paths."""
+    return {*TIMES, *FUNCTIONS, *(name for each in TAKEN if each.topic == topic for name in each.fields)}
+
+
+def numbering(parameters: Mapping[str, float]) -> tuple[tuple[int, ...], str]:
+    """PX4's rotors in our order, and what a note says of them. There is no order if the vehicle is no quadrotor X."""
+    count = int(parameters.get("CA_ROTOR_COUNT", 0)) if parameters.get("SYS_CTRL_ALLOC", 1) else 0
+    if not count:
+        kind, frame = (int(parameters.get(name, 0)) for name in ("MAV_TYPE", "SYS_AUTOSTART"))
+        if kind not in (0, _QUADROTOR):
+            return (), f"MAV_TYPE is {kind}; accepted: {_QUADROTOR}, a quadrotor"
+        if frame in _PLUS:
+            return (), f"SYS_AUTOSTART is {frame}, a quadrotor +; accepted: a quadrotor X"
+        return ORDER, ASSUMED
+    places = [tuple(parameters.get(f"CA_ROTOR{i}_P{axis}", 0.0) for axis in "XY") for i in range(min(count, 12))]
+    signs = [(np.sign(x), np.sign(y)) for x, y in places]
+    if sorted(signs) != sorted(_QUADRANTS):
+        told = ", ".join(f"({x:g}, {y:g})" for x, y in places)
+        return (), f"CA_ROTOR*_PX and _PY place the rotors at {told} m; accepted: a quadrotor X, one in each quadrant"
+    order = tuple(signs.index(quadrant) for quadrant in _QUADRANTS)
+    told = ", ".join(f"{corner} is {i + 1}" for corner, i in zip(_CORNERS, order, strict=True))
+    return order, f"CA_ROTOR*_PX and _PY tell the order of the rotors: {told}"
+
+
+def put_topic(
+    streams: Streams,
+    topic: str,
+    fields: Mapping[str, np.ndarray],
+    without: Sequence[str] = (),
+    order: Sequence[int] = ORDER,
+) -> bool:
     """Add the streams that a topic gives. `fields` has (n,) numbers by the path of the field, such as `xyz[0]`. Streams
-    of `without` are not wanted.
+    of `without` are not wanted. `order`: PX4's rotors in our order; empty if they have none. Returns whether there is a
+    new stream.
     """
+    before = len(streams.found)
     wanted = [each for each in TAKEN if each.topic == topic and each.stream not in (*streams.found, *without)]
     times = [np.asarray(fields[name], float) for name in TIMES if name in fields]
     if wanted and not times:
         streams.notes.append(f"{topic} is left out: it has no time stamps")
-        return
+        return False
     for each in wanted:
         if missing := [name for name in each.fields if name not in fields]:
             streams.notes.append(f"{topic} gives no {each.stream}: it has no field {missing[0]}")
@@ -101,7 +166,30 @@ def put_topic(streams: Streams, topic: str, fields: Mapping[str, np.ndarray], wi
         time = np.where(times[0] > 0, times[0], times[-1]) * 1e-6
         numbers = np.stack([np.asarray(fields[name], float) for name in each.fields], -1)
         numbers[~(np.abs(numbers) < 1e30)] = np.nan
-        streams.put(each.stream, time, each.turn(numbers), topic)
+        try:
+            values = each.turn(numbers)
+        except ValueError as error:
+            streams.notes.append(f"{topic} gives no {each.stream}: {error}")
+            continue
+        if each.stream in ROTORS:
+            if not order:
+                continue
+            values = values[:, _motors(fields)][:, order]
+        if streams.put(each.stream, time, values, topic) and each.stream == "setpoint":
+            streams.notes.append(f"the thrust of {topic} is a share of the largest, not m/s^2: it is not used")
+    return len(streams.found) > before
+
+
+def _motors(fields: Mapping[str, np.ndarray]) -> list[int]:
+    """At which place each motor stands, by what the ESCs turn. Where the log does not say it, motors are in order."""
+    turned = [int(np.median(fields[name])) - _FIRST_MOTOR for name in FUNCTIONS if name in fields and len(fields[name])]
+    return [turned.index(i) for i in _FOUR] if sorted(turned) == [*_FOUR] else [*_FOUR]
+
+
+def _moves(fields: Mapping[str, np.ndarray]) -> bool:
+    """Whether every number of a topic changes."""
+    numbers = [values for name, values in fields.items() if name not in (*TIMES, *FUNCTIONS)]
+    return all(len(values) and np.ptp(values) > 0 for values in numbers)
 
 
 def read_ulog(path: Path) -> Record:
@@ -110,22 +198,29 @@ def read_ulog(path: Path) -> Record:
     Raises:
         ValueError: when it is no such log, or when none of its topics is known here.
     """
-    known = {each.topic for each in TAKEN}
     with mapped(path) as data:
         if data[: len(MAGIC)] != MAGIC:
             raise ValueError(f"{path}: does not begin as a PX4 log does; accepted: a .ulg file")
         log = _Log(data[:])
     streams, used = Streams(), set()
+    order, told = numbering(log.parameters)
     if log.cut_off:
         streams.notes.append(log.cut_off)
-    for topic in dict.fromkeys(each.topic for each in TAKEN):
-        instances = sorted(number for name, number in log.samples if name == topic)
-        for number in instances[:1]:
-            put_topic(streams, topic, log.fields(topic, number))
+    chosen = {}
+    for topic in {each.topic: None for each in TAKEN}:
+        instances = {n: log.fields(topic, n) for n in sorted(n for name, n in log.samples if name == topic)}
+        number = next((n for n, fields in instances.items() if _moves(fields)), min(instances, default=0))
+        chosen |= {(topic, number): instances[number]} if instances else {}
+    for (topic, number), fields in sorted(chosen.items(), key=lambda each: -len(log.samples[each[0]])):
+        if put_topic(streams, topic, fields, order=order):
             used.add((topic, number))
-    unused = [f"{name}[{i}]" if name in known else name for name, i in sorted(log.samples) if (name, i) not in used]
+    if not order:
+        streams.notes.append(f"{listed(ROTORS)} are left out: {told}")
+    elif streams.found.keys() & {*ROTORS}:
+        streams.notes.append(told)
+    unused = [f"{name}[{i}]" if i else name for name, i in sorted(log.samples) if (name, i) not in used]
     if unused:
-        streams.notes.append(f"topics that are not used: {listed(unused)}")
+        streams.notes.append(f"topics that are not used: {listed(unused, UNUSED)}")
     return streams.record(path)
 
 
@@ -138,6 +233,8 @@ class _Log:
         self.samples: dict[tuple[str, int], list[bytes]] = defaultdict(list)
         """The data of each topic and instance."""
         self.cut_off = ""
+        self.parameters: dict[str, float] = {}
+        """The values of the parameters at the beginning."""
         topics: dict[int, tuple[str, int]] = {}
         at, lost, count = _BEGIN, 0, 0
         while at + _HEAD.size <= len(data):
@@ -154,6 +251,11 @@ class _Log:
             if kind == ord("F"):
                 name, _, text = data[begin:end].decode("utf-8", "replace").partition(":")
                 self._formats[name] = text
+            elif kind == ord("P") and size > 1:
+                place = begin + 1 + data[begin]
+                form, _, name = data[begin + 1 : place].decode("utf-8", "replace").partition(" ")
+                if form in _TYPES and end - place == np.dtype(_TYPES[form]).itemsize:
+                    self.parameters.setdefault(name, float(np.frombuffer(data[place:end], f"<{_TYPES[form]}")[0]))
             elif kind == ord("A") and size > 3:
                 instance, number = struct.unpack_from("<BH", data, begin)
                 topics[number] = data[begin + 3 : end].decode("utf-8", "replace"), instance
@@ -171,8 +273,7 @@ class _Log:
 
     def fields(self, topic: str, instance: int) -> dict[str, np.ndarray]:
         """The samples of the fields that are used of a topic, (n,) each."""
-        wanted = {*TIMES, *(name for each in TAKEN if each.topic == topic for name in each.fields)}
-        if not self._size(topic) or not (places := self._places(topic, wanted)):
+        if not self._size(topic) or not (places := self._places(topic, fields_of(topic))):
             return {}
         least = max(place + np.dtype(form).itemsize for place, form in places.values())
         whole = [sample[:least] for sample in self.samples[topic, instance] if len(sample) >= least]
