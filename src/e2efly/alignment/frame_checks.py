@@ -21,6 +21,8 @@ FIT, BETTER = 0.5, 0.25
 """`FIT`: lowest correlation, on each axis with enough motion, at which two streams agree. `BETTER`: a remedy that
 leaves less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
 `FIT`."""
+BETTER_HALF = 0.5
+"""The same as `BETTER` in each half of a flight."""
 SMALL = 0.0005
 """Disagreement that shows nothing."""
 ENOUGH = {"turn": 0.15, "steer": 0.15, "push": 0.3, "slide": 0.1}
@@ -162,7 +164,23 @@ def judged_frames(part: Record) -> Judgement:
             fits = all(new[name].worst <= 1 - FIT for name in sure)
             if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
                 best, least = remedy, left
+    if best is not None and not wrong and not all(_helped(half, best, sure) for half in _halves(values)):
+        best = None  # a wrong frame is wrong all the time, but wind, gusts and drag are not
     return Judgement(usual, wrong, best)
+
+
+def _halves(values: Values) -> tuple[Values, Values]:
+    """The first and the second half of a flight."""
+    middle = len(next(iter(values.values()))) // 2
+    return {k: v[:middle] for k, v in values.items()}, {k: v[middle:] for k, v in values.items()}
+
+
+def _helped(values: Values, remedy: Remedy, sure: Collection[str]) -> bool:
+    """Whether a remedy brings streams that nearly agree nearer, or if there is too little motion to tell."""
+    usual = _misfits(values)
+    new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
+    seen = {name for name in sure if RELATIONS[name] & remedy.needs} & set(usual) or {"steer"} & set(usual)
+    return sum(new[name].whole for name in seen) < max(BETTER_HALF * sum(usual[name].whole for name in seen), SMALL)
 
 
 def in_one_frame(record: Record, part: Record) -> Record:

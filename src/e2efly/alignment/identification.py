@@ -235,10 +235,16 @@ def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, so
 
 
 def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[LeftOver]:
-    """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others."""
-    left = []
+    """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others.
+
+    The velocity is the sum of the specific force, without the vibration, which grows with the motion as missing
+    structure does. Where it was measured, it judges in place of the specific force.
+    """
+    left, followed = [], {"quaternion", "position"}
+    if "velocity" in found.squares and np.isfinite(found.squares["velocity"]).any():
+        followed.add("specific_force")
     for name in found.squares:
-        if name not in ("quaternion", "position"):
+        if name not in followed:
             moved = motion(windows.measured[name], windows.there[name])
             white = np.mean([white_noise(r.streams[name].values) for r in records if r.has(name)])
             left.append(misfit(name, found.squares[name], moved, float(white)))
