@@ -188,7 +188,7 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
 def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
     """A different vehicle in every episode, and a policy with a memory that senses it."""
     algo = config.algo.name
-    given = task.robust.get(algo)
+    given = (task.identified if name == IDENTIFIED else {}).get(algo, task.robust.get(algo))
     if name == IDENTIFIED and (other := task.family.get(algo)):
         # the zoo's policy for any quadrotor also flies this vehicle, and adapts to it in a few steps
         given = dataclasses.replace(given or other, steps=other.steps // ONE_OF_A_FAMILY, eased=None)
