@@ -185,3 +185,13 @@ def test_what_has_no_sigma_or_one_that_is_too_wide_is_refused(file: str, capsys:
 
 def said(capsys: pytest.CaptureFixture[str]) -> str:
     return " ".join(capsys.readouterr().err.split())
+
+
+def test_what_another_vehicle_does_not_have_is_not_drawn(file: str, tmp_path: Path) -> None:
+    """A policy's own file may tell of a slower fall of the rotors, and the vehicle that flies it may not."""
+    down = {"motor_time_constant_down": Estimate("motor_time_constant_down", np.array(0.05), np.array(0.005), "flight")}
+    write_vehicle(tmp_path / "down.toml", file, load_vehicle(file), down)
+    posterior = load_posterior(tmp_path / "down.toml")
+    deviation = posterior.deviation(np.ones((3, posterior.root.shape[1])))
+    assert "motor_time_constant_down" in posterior.values(load_vehicle(tmp_path / "down.toml"), deviation)
+    assert "motor_time_constant_down" not in posterior.values(BASE, deviation)
