@@ -174,11 +174,11 @@ used for tuning. In MuJoCo, truth is exact. Behind the firmware, it is the rig's
 age and time from a command to the setpoint) and the body's motor lag; only the bridge's own log is used.
 [How it is done](identification.md#steps).""",
     "tune": """
-Race with VIS-R's file. The body has up to 25 % more mass, up to 20 % less thrust, inertia up to x1.5,
-motor lag up to x1.6, up to 30 ms more delay and drag up to x2, and at least half of each of these changes.
-Success is that of 100 flights in MuJoCo on the hidden body. A vehicle takes 91 s (median; 114 s at most)
-from the log to the policy: 18 s to identify, 46 s to train, 26 s to evaluate with stress. Other programs
-ran at the same time for most of it.""",
+VIS-R's file. The body has up to 25 % more mass, up to 20 % less thrust, inertia up to x1.5, motor lag up
+to x1.6, up to 30 ms more delay and drag up to x2, and at least half of each of these changes. The policies'
+columns have the success of 100 flights in MuJoCo on the hidden body, and the median time of a success. The
+stress is flown about the identified vehicle, 250 starts a row. The seconds are those of one body, and
+other programs ran at the same time. [How it is done](identification.md#from-a-log-to-a-policy).""",
     "plants_by_sight": """
 The starts and worlds are those of `e2efly eval`. Images are rendered at the plant's true pose.""",
     "image_faults": """

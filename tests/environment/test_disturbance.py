@@ -190,3 +190,17 @@ def test_gradients_reach_through_each_disturbance(
     exact, numeric = jacobians[what]
     np.testing.assert_allclose(exact, numeric, rtol=1e-5, atol=1e-7)
     assert np.abs(exact).max() > 1e-4
+
+
+def test_a_share_of_the_episodes_has_a_mixer_that_gives_up_torque_at_full_thrust() -> None:
+    d = draw(DisturbanceConfig(plain_mixer=0.3), random_key(1), 20_000)
+    assert set(np.unique(d.plain_mixer)) == {0.0, 1.0}
+    assert float(d.plain_mixer.mean()) == pytest.approx(0.3, abs=0.02)
+    rates = {}
+    for share in (0.0, 1.0):
+        env = disturbed(plain_mixer=share, sag=1e-6)
+        state = env.reset(random_key(0), 4)[0]
+        for _ in range(5):
+            state = step(env, state, jnp.broadcast_to(jnp.array([1.0, 0.5, 0.0, 0.0]), (4, 4)))[0]
+        rates[share] = float(state.vehicle.body_rate[0, 0])
+    assert 0 < rates[1.0] < 0.9 * rates[0.0]

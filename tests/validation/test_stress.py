@@ -58,7 +58,7 @@ def test_each_row_changes_what_it_says_and_nothing_else() -> None:
             wanted = {"sag": row.sag, "drift_rate": row.drift, "gust_speed": row.gust}[field]
             np.testing.assert_array_equal(getattr(draw.disturbance, field), wanted)
         assert NoiseConfig(*(float(x[0, 0]) for x in vars(draw.noise).values())) == row.noise  # type: ignore[index]
-        np.testing.assert_array_equal(draw.plain_mixer, float(row.plain_mixer))
+        np.testing.assert_array_equal(draw.disturbance.plain_mixer, float(row.plain_mixer))
 
 
 def test_all_at_once_draws_each_between_the_extremes_of_the_rows() -> None:

@@ -151,3 +151,7 @@ def test_an_identified_vehicle_has_the_ranges_of_its_widest_draws() -> None:
     assert low["rate_gain_x"] == pytest.approx(0.7)
     assert low["hover_thrust"] == pytest.approx(np.exp(-0.1) / (2 - np.exp(-0.05)))  # of the ceiling, too
     assert "latency" not in ranges  # the contract has the delays that were drawn
+    wider = dataclasses.replace(config, randomize={**config.randomize, "mass": 0.2, "inertia": 0.5})
+    low = {part.name: part.low / own[part.name] for part in vehicles_of(wider, OWN, posterior) if own[part.name]}
+    assert low["mass"] == pytest.approx(0.8 * np.exp(-0.1))  # about what the file leaves open
+    assert low["inertia_x"] == pytest.approx(0.5 * np.exp(-0.25)) and low["inertia_y"] == pytest.approx(0.5)

@@ -72,7 +72,7 @@ def _identify(options: Identify) -> int:
     from e2efly.logs import csv_file
 
     began = time.perf_counter()
-    files, console = _sources(options.sources), Terminal()
+    files, console = files_of(options.sources), Terminal()
     known = {"flight": csv_file.COLUMNS, "step": csv_file.COLUMNS, "stand": tuple(stand_file.COLUMNS)}
     used = dict.fromkeys(name for kind, names in known.items() if files[kind] for name in names)
     if options.read.columns and not used:
@@ -139,7 +139,12 @@ def _identify(options: Identify) -> int:
     return 0
 
 
-def _sources(words: Sequence[str]) -> dict[str, list[Path]]:
+def files_of(words: Sequence[str]) -> dict[str, list[Path]]:
+    """The files of each kind of source.
+
+    Raises:
+        ValueError: for a file without a kind, for a kind without a file, and if there is no file at all.
+    """
     files: dict[str, list[Path]] = {kind: [] for kind in KINDS}
     kind = ""
     for word in words:

@@ -50,6 +50,9 @@ class DisturbanceConfig:
     push: float = number(0.0, high=0.9, added=True)
     """Largest force from outside at the centre of mass, relative to the vehicle's weight. It is constant in an episode,
     in a random horizontal direction."""
+    plain_mixer: float = number(0.0, high=1.0, added=True)
+    """Share of the episodes in which the mixer clips each rotor by itself. In the others attitude has priority over
+    thrust."""
 
     @property
     def weakest(self) -> float:

@@ -216,6 +216,8 @@ class TaskConfig:
     robust: ClassVar[Mapping[str, Robust]] = {}
     """Recipe for training with vehicles that differ from the vehicle file, by algorithm. These algorithms have the
     preset `robust`."""
+    identified: ClassVar[Mapping[str, Robust]] = {}
+    """The same for the preset `identified`, where it differs from `robust`."""
     family: ClassVar[Mapping[str, Robust]] = {}
     """Recipe for training with all vehicles of a family together, by algorithm."""
     cameras: ClassVar[tuple[CameraConfig, ...]] = ()

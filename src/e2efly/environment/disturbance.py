@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import DisturbanceConfig
+from e2efly.simulation.physics import Physics
 from e2efly.simulation.physics.body import rotor_speed_for
 from e2efly.tasks.task import uniform
 from e2efly.vehicles.gravity import GRAVITY
@@ -41,18 +42,24 @@ class Disturbance:
     """Highest thrust of each rotor relative to that of the thrust map at full speed. 1: no ceiling of its own."""
     push: Float[Array | np.ndarray, "n 2"]
     """Acceleration by a constant horizontal force from outside, world, m/s^2."""
+    plain_mixer: Float[Array | np.ndarray, " n"]
+    """1: the mixer clips each rotor by itself. 0: attitude has priority over thrust."""
 
     @staticmethod
     def none(n: int) -> "Disturbance":
         """No disturbance."""
         zero, zeros = jnp.zeros(n), jnp.zeros((n, 3))
         return Disturbance(
-            zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)), zeros[:, :2]
+            zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)), zeros[:, :2], zero
         )
 
     def share(self, progress: Float[Array, " n"]) -> Float[Array, "n 4"]:
         """Thrust of each rotor relative to that of the thrust map, after this share of the episode."""
         return jnp.asarray(self.rotor_share) * (1 - self.sag * progress)[:, None]
+
+    def mixed(self, physics: Physics) -> Physics:
+        """Physics with these mixers."""
+        return replace(physics, mixer=replace(physics.mixer, plain=jnp.asarray(self.plain_mixer)))
 
     def weaker(self, plant: Vehicle, known: Vehicle, thrust_max: float | Array) -> Vehicle:
         """A plant whose rotors have these ceilings, too.
@@ -71,7 +78,8 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
     """The disturbances of n episodes.
 
     Args:
-        config: the largest strengths. Each episode draws its own strength uniformly between zero and these.
+        config: the largest strengths. Each episode draws its own strength uniformly between zero and these. The mixer
+            is of one kind or of the other.
         key: the random key.
         n: the number of episodes.
     """
@@ -90,6 +98,7 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
         drift=jnp.zeros((n, 3)),
         ceiling=1 - config.ceiling * jax.random.uniform(jax.random.fold_in(key, 3), (n, 4)),
         push=(config.push * pushed * jnp.stack([jnp.cos(way), jnp.sin(way)])).T,
+        plain_mixer=1.0 * (jax.random.uniform(jax.random.fold_in(key, 5), (n,)) < config.plain_mixer),
     )
 
 

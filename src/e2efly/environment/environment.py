@@ -374,6 +374,7 @@ class Env:
             wind = gust if wind is None else wind + gust
             share, push = disturbed.share(state.time / self.task.episode_s), jnp.asarray(disturbed.push)
             plant = disturbed.weaker(plant, physics.nominal, physics.mixer.thrust_max)
+            physics = disturbed.mixed(physics)
             disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
         after = step(
             physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share, push=push
@@ -424,14 +425,16 @@ class Env:
         if self.family is not None:
             family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
         flown = self._physics(family).flown
-        disturbed, plant = None, perturbed(plant_key, n, self.physics.flown, self.randomize, flown)
+        disturbed, known = None, dict[str, Any]()
         if self.posterior is None:
             late = between(action_key, n, self.latency_range)
         else:
             deviation = deviations(jax.random.fold_in(plant_key, 3), n, self.posterior, self.center.dtype)
-            plant |= self.posterior.values(self.physics.flown, deviation)
+            known = self.posterior.values(self.physics.flown, deviation)
             nominal = self.physics.flown.latency
             late = delays(action_key, self.latency_range, nominal, self.posterior, deviation)
+        about = dataclasses.replace(flown, **known)
+        plant = known | perturbed(plant_key, n, self.physics.flown, self.randomize, about)
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
             disturbed = disturbance.draw(self.disturbance, disturbed_key, n)

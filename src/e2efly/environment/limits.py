@@ -52,18 +52,19 @@ def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None
     """The ranges of the vehicles that episodes draw about one vehicle, for the contract of a policy.
 
     A posterior counts up to its widest draws. They are in the logarithm; the range has their lower, narrower side on
-    both sides. What an episode's disturbances take of the thrust is no property of the vehicle, and stays a reserve.
+    both sides. Other draws of the same parameter are about them. What an episode's disturbances take of the thrust is
+    no property of the vehicle, and stays a reserve.
     """
     shares: dict[str, Any] = {name: width for name, width in config.randomize.items() if name != IDENTIFIED}
     entries = () if posterior is None else zip(posterior.entries, posterior.sigma.values(), strict=True)
     for entry, sigma in entries:
         if entry.field in ADDED:
             continue
-        share = -np.expm1(-WIDEST * sigma)
+        share, at = -np.expm1(-WIDEST * sigma), ... if entry.index is None else entry.index
         for name in (entry.field, *TOGETHER.get(entry.field, ())):
             own = np.shape(getattr(vehicle, name))
-            each = np.array(shares.get(name, np.zeros(own)), np.float64)
-            each[... if entry.index is None else entry.index] = share
+            each = np.broadcast_to(np.float64(shares.get(name, 0.0)), own).copy()
+            each[at] = 1 - (1 - share) * (1 - each[at])
             shares[name] = each
     return drawn_domain(vehicle, config.command_mode, shares, float(config.disturbance.centre_of_mass))
 
@@ -88,8 +89,7 @@ def posterior_of(config: EnvConfig) -> Posterior | None:
     """The distribution around the vehicle's file from which episodes draw. None: they do not draw from one.
 
     Raises:
-        ValueError: for a file without standard deviations, for a factor out of range, and for a parameter that is also
-            drawn in another way.
+        ValueError: for a file without standard deviations, and for a factor out of range.
     """
     width = config.randomize.get(IDENTIFIED, 0.0)
     if not 0 <= width <= MOST:
@@ -97,10 +97,4 @@ def posterior_of(config: EnvConfig) -> Posterior | None:
     if not width:
         return None
     posterior = load_posterior(config.vehicle).times(width)
-    for entry in posterior.entries:
-        if config.randomize.get(entry.field):
-            raise ValueError(
-                f"env.randomize has {IDENTIFIED} and {entry.field}, and {config.vehicle} has a sigma of {entry.name}; "
-                "accepted: one of the two"
-            )
     return posterior if config.action_latency is None else posterior.without_latency()

@@ -137,8 +137,6 @@ class Draw:
     wind: np.ndarray
     """(n, 3) wind, m/s."""
     disturbance: Disturbance
-    plain_mixer: np.ndarray
-    """(n,) whether the mixer clips each rotor separately."""
     noise: NoiseConfig
     """White noise of the observed state, with values of shape (n, 1)."""
     camera: CameraDraw
@@ -197,8 +195,8 @@ class Draw:
                 drift=np.zeros((n, 3)),
                 ceiling=np.ones((n, 4)),
                 push=np.zeros((n, 2)),
+                plain_mixer=zero + row.plain_mixer,
             ),
-            plain_mixer=zero + row.plain_mixer,
             noise=NoiseConfig(**noise),  # type: ignore[arg-type]
             camera=CameraDraw.of(None if everything else row.camera, rng.spawn(1)[0], n),
             **_told(None if everything else row, rng.spawn(1)[0], n),
@@ -212,11 +210,8 @@ class Draw:
 
     def env(self, env: Env) -> Env:
         """The environment with the changes of a row."""
-        mixer = dataclasses.replace(env.physics.mixer, plain=self.plain_mixer)
-        physics = dataclasses.replace(env.physics, mixer=mixer)
         return dataclasses.replace(
             env,
-            physics=physics,
             noise=self.noise,
             cameras=with_noise(env.cameras),
             estimate=EstimateConfig(),

@@ -56,14 +56,14 @@ OTHERS = EnvConfig(
     noise=NoiseConfig(position=0.01, velocity=0.05, attitude=0.005, body_rate=0.02),
 )  # fmt: skip
 """The vehicles of the preset `robust`, the air, the state estimate and the link."""
-AROUND = EnvConfig(
-    randomize={posterior.IDENTIFIED: 1.0},
-    wind=2.0,
-    disturbance=DisturbanceConfig(gust=0.5, thrust=0.05, rotor=0.03, sag=0.12, centre_of_mass=0.002),
+AROUND = dataclasses.replace(
+    OTHERS,
+    randomize={**OTHERS.randomize, posterior.IDENTIFIED: 1.0},
+    disturbance=dataclasses.replace(OTHERS.disturbance, plain_mixer=0.3),
 )
-"""The vehicles of the preset `identified`: the uncertainty that the file's standard deviations give, and effects that
-no file gives."""
-ONE_OF_A_FAMILY = 5
+"""The vehicles of the preset `identified`: the uncertainty that the file's standard deviations give, and about each of
+these vehicles what the preset `robust` draws, with two kinds of mixers."""
+ONE_OF_A_FAMILY = 6
 """Factor by which the preset `identified` has fewer steps than the recipe for a family. It begins with a policy of that
 family."""
 BESIDE_CAMERA = {"angle_spread": 0.06, "position_spread": 0.012, "fov_spread": 0.04}
@@ -188,10 +188,10 @@ def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:
 def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainConfig:
     """A different vehicle in every episode, and a policy with a memory that senses it."""
     algo = config.algo.name
-    given = task.robust.get(algo)
+    given = (task.identified if name == IDENTIFIED else {}).get(algo, task.robust.get(algo))
     if name == IDENTIFIED and (other := task.family.get(algo)):
         # the zoo's policy for any quadrotor also flies this vehicle, and adapts to it in a few steps
-        given = dataclasses.replace(other, steps=other.steps // ONE_OF_A_FAMILY)
+        given = dataclasses.replace(given or other, steps=other.steps // ONE_OF_A_FAMILY, eased=None)
         if task.name in zoo.contents().get(FAMILY, {}):
             config = dataclasses.replace(config, start_from=f"{FAMILY}/{task.name}")
     if given is None:
@@ -215,15 +215,15 @@ def _having(recipes: str) -> str:
 def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
     """A configuration for another vehicle or a family, given by name or .toml file.
 
-    If the weakest vehicle of the preset `robust` could not hover, the ranges of mass and thrust are all reduced by the
-    same factor. The centre of mass is drawn no farther off than the rate loop can hold (`_held`). For a family the
-    preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
+    If the weakest vehicle of the preset `robust` or `identified` could not hover, the ranges of mass and thrust are all
+    reduced by the same factor. The centre of mass is drawn no farther off than the rate loop can hold (`_held`). For a
+    family the preset draws `BESIDE_FAMILY`, and learns as the task specifies for families.
 
     Raises:
         ValueError: for a vehicle that does not exist.
     """
     env = dataclasses.replace(config.env, vehicle=vehicle)
-    robust = (env.randomize, env.disturbance) == (OTHERS.randomize, OTHERS.disturbance)
+    robust = any((env.randomize, env.disturbance) == (drawn.randomize, drawn.disturbance) for drawn in (OTHERS, AROUND))
     if robust and load_family(vehicle) is not None:
         given = config.task.family.get(config.algo.name)
         if given is None:
@@ -234,9 +234,12 @@ def for_vehicle(config: TrainConfig, vehicle: str) -> TrainConfig:
         env = dataclasses.replace(BESIDE_FAMILY, vehicle=vehicle, cameras=env.cameras)
         return given.into(dataclasses.replace(_nominal(type(config.task), type(config.algo)), env=env))
     if robust:
-        known = load_vehicle(vehicle)
+        known, sure = load_vehicle(vehicle), 1.0
+        if posterior.IDENTIFIED in env.randomize:
+            sure -= posterior.WIDEST * posterior.load_posterior(vehicle).thrust_sigma
         shares = (_narrower(env, percent / 100) for percent in range(100, -1, -1))
-        env = next(drawn for drawn in shares if known.thrust_to_weight * drawn.weakest >= 1)
+        enough = (drawn for drawn in shares if sure * known.thrust_to_weight * drawn.weakest >= 1)
+        env = next(enough, _narrower(env, 0.0))
         off = min(env.disturbance.centre_of_mass, _held(known, env.randomize["rate_gain"]))
         env = dataclasses.replace(env, disturbance=dataclasses.replace(env.disturbance, centre_of_mass=off))
     return dataclasses.replace(config, env=env)

@@ -131,7 +131,7 @@ def realities(drawn: Draw, vehicle: Vehicle, seed: int, steps: int, period: floa
         Reality(
             drawn.vehicle(vehicle, i),
             float(drawn.latency[i]),
-            bool(drawn.plain_mixer[i]),
+            bool(drawn.disturbance.plain_mixer[i]),
             None if calm else Air(wind[:, i], share[:, i], error[:, i]),
         )
         for i in range(n)

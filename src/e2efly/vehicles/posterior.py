@@ -115,11 +115,11 @@ class Posterior:
 
     def values(self, vehicle: Vehicle, deviation: Any) -> dict[str, Any]:
         """Fields of the vehicles that have these deviations, each (n, ...), without the latency. `vehicle` is the
-        vehicle with deviations of zero. `deviation` is (n, d), from `deviation`.
+        vehicle with deviations of zero. What it does not have is left out. `deviation` is (n, d), from `deviation`.
         """
         drawn: dict[str, list[Any]] = {}
         for i, entry in enumerate(self.entries):
-            if entry.field != LATENCY:
+            if entry.field != LATENCY and getattr(vehicle, entry.field) is not None:
                 drawn.setdefault(entry.field, []).append((entry.index, deviation[:, i]))
         out: dict[str, Any] = {}
         for field, moved in drawn.items():

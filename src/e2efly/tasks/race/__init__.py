@@ -58,6 +58,11 @@ class RaceConfig(TaskConfig):
             eased=(0.4, 4_000_000),
         )
     }
+    identified: ClassVar = {
+        "bptt": dataclasses.replace(
+            robust["bptt"], weights={"progway": 1.0, "fitlog": 4.0, "anglev_sq": 0.001, "act2_sq": 0.01}
+        )
+    }
     family: ClassVar = {
         "bptt": Robust(
             weights={"progway": 1.0, "fitlog": 40.0, "anglev_sq": 0.001, "act2_sq": 0.01},
