@@ -17,7 +17,8 @@ OTHERS = (
     "sim_to_sim", "firmware_flights", "firmware_vehicles",
     "firmware_faults", "command_flights", "controllers", "fault_campaign --publish", "process_faults", "bridge_loop",
     "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
-    "identify", "step_response", "step_alignment", "step_alignment --plant betaflight --vehicles 6",
+    "identify", "identify --plant structure --bare --first 1010", "step_response",
+    "step_alignment", "step_alignment --plant betaflight --vehicles 6",
 )  # fmt: skip
 HERE = Path(__file__).parent
 

@@ -161,7 +161,7 @@ def identify(
             if driver == "rotor_speed"
             else fit(model, seen, start, told=told, fixed=fixed)
         )
-        return found, misfits(found, seen, records)
+        return found, misfits(model, found, seen, records)
 
     found, left = fitted(np.zeros(len(absent)) if driver == "rotor_speed" else begin(model, seen), absent)
     sigma = sigmas(model, found, [] if step else left)
@@ -234,14 +234,15 @@ def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, so
     return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * sigma[z]), source)]
 
 
-def misfits(found: Fit, windows: Windows, records: Sequence[Record]) -> list[LeftOver]:
+def misfits(model: Model, found: Fit, windows: Windows, records: Sequence[Record]) -> list[LeftOver]:
     """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others.
 
-    The velocity is the sum of the specific force, without the vibration, which grows with the motion as missing
-    structure does. Where it was measured, it judges in place of the specific force.
+    The vibration of a real vehicle grows with the motion, as missing structure does. The velocity is the sum of the
+    specific force without it, and judges in its place where motor outputs drive the fit. For other drivers, whose logs
+    are the ones with which the alarm was calibrated (`benchmarks/identify.py --plant structure`), both judge.
     """
     left, followed = [], {"quaternion", "position"}
-    if "velocity" in found.squares and np.isfinite(found.squares["velocity"]).any():
+    if model.driver in ("motor", "motor_and_rate") and np.isfinite(found.squares.get("velocity", np.nan)).any():
         followed.add("specific_force")
     for name in found.squares:
         if name not in followed:
