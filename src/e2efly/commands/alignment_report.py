@@ -85,8 +85,8 @@ def run(options: AlignmentReport) -> int:
     vehicle = options.vehicle or (str(identified[-1][0] / "vehicle.toml") if identified else None)
     shown = vehicle or next((report["vehicle"] for _, report in aligned), "vis_r")
     load_vehicle(shown)
-    noise = _noise(options, shown, console)
-    stages = [_identification(identified), _latency(aligned, identified), _randomisation(vehicle), noise]
+    stages = [_identification(identified), _latency(aligned, identified), _randomisation(vehicle)]
+    stages.append(_noise(options, shown, console))  # the only one that writes
     about = [
         f"e2efly {__version__}, {datetime.datetime.now(datetime.UTC):%Y-%m-%d}",
         f"From {', '.join(map(str, options.folders))}{f' and {options.hover}' if options.hover else ''}.",
