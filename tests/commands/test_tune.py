@@ -12,6 +12,7 @@ import e2efly
 from e2efly.commands.cli import run
 from e2efly.commands.fly import Fly
 from e2efly.commands.identify import Identify
+from e2efly.commands.tune import Tune
 from e2efly.config.storage import held
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.telemetry import Telemetry
@@ -141,6 +142,10 @@ def test_the_flight_through_the_firmware_is_what_the_vehicle_is_identified_from(
     found = json.loads((out / "identified" / "identified.json").read_text())["parameters"]["latency"]
     assert found["source"] == f"{log.name}; flight"
     assert abs(found["value"] - body.latency) < 3 * found["sigma"] < 0.03
+
+
+def test_its_flight_has_the_defaults_of_fly() -> None:
+    assert all(getattr(Tune, name) == getattr(Fly, name) for name in ("pose", "guard", "flight", "excitation"))
 
 
 @pytest.mark.parametrize("asked", [["tune", "--task", "hover"], ["identify", "flight"]])

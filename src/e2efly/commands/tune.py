@@ -9,13 +9,13 @@ from typing import Annotated, Literal
 import tyro
 
 from e2efly.commands import eval as evaluation
-from e2efly.commands import fly, identify, train
-from e2efly.commands.fly import Fly
+from e2efly.commands import identify, train
 from e2efly.commands.identify import KINDS, Identify, files_of
 from e2efly.commands.log_options import LogOptions
 from e2efly.commands.terminal import Terminal
 from e2efly.config.storage import held, write_atomically, write_json
 from e2efly.flight.excitation import ExcitationOptions
+from e2efly.flight.process import need_system
 from e2efly.flight.settings import FlightSettings
 from e2efly.tasks import TASKS
 from e2efly.vehicles.posterior import IDENTIFIED
@@ -49,9 +49,9 @@ class Tune:
     link: str | None = None
     """Connection to the flight controller, as `e2efly fly` takes it. If it is given, the excitation is flown first, and
     its log is in --out/flights. The pilot's switches decide. See docs/flying.md before the first flight."""
-    pose: str = Fly.pose
+    pose: str = "udp:9870"
     """Pose source of that flight, as `e2efly fly` takes it."""
-    guard: Literal["switch", "filter"] = Fly.guard
+    guard: Literal["switch", "filter"] = "switch"
     """What keeps that flight inside the fence, as in `e2efly fly`."""
     flight: FlightSettings = FlightSettings()
     """Heights, speeds, time-outs, fence, channels of that flight."""
@@ -141,12 +141,18 @@ def _excited(o: Tune, link: str) -> Path:
 
     Returns:
         the log of the flight.
+
+    Raises:
+        OSError: on a system on which `e2efly fly` does not run.
     """
+    need_system("`e2efly tune --link`", "linux")
+    from e2efly.commands import fly
+
     log = o.out / "flights" / time.strftime("%Y-%m-%d_%H-%M-%S.mcap")
     interrupt = signal.getsignal(signal.SIGINT)
     try:
         fly.run(
-            Fly(
+            fly.Fly(
                 Path("excitation"), link=link, pose=o.pose, vehicle=o.vehicle, log=log, guard=o.guard, flight=o.flight,
                 excitation=o.excitation,
             )
