@@ -44,7 +44,7 @@ def test_noise_and_biases_of_every_sensor() -> None:
     for name, sigma in SIGMA.items():
         assert np.allclose(found[name].sigma, sigma, rtol=0.12), name
         assert abs(found[name].memory) < 0.2, name
-    assert np.allclose(found["body_rate"].density, 0.05 / np.sqrt(500), rtol=0.1)
+    assert found["body_rate"].rate == pytest.approx(500)
     assert np.allclose(found["body_rate"].bias, GYRO_BIAS, atol=4e-3)
     assert np.allclose(found["specific_force"].bias, FORCE_BIAS, atol=0.03)
     assert found["position"].bias is None

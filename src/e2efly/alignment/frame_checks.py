@@ -22,7 +22,7 @@ FIT, BETTER = 0.5, 0.25
 leaves less than this share of what the streams disagree by shows that frames are wrong, even where the streams agree by
 `FIT`."""
 BETTER_HALF = 0.5
-"""The same as `BETTER` in each half of a flight."""
+"""The same as `BETTER` for all axes together in each half of a flight."""
 SMALL = 0.0005
 """Disagreement that shows nothing."""
 ENOUGH = {"turn": 0.15, "steer": 0.15, "push": 0.3, "slide": 0.1}
@@ -158,13 +158,13 @@ def judged_frames(part: Record) -> Judgement:
     for remedy in _remedies():
         if remedy.needs <= set(values):
             new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
-            seen = {name for name in sure if RELATIONS[name] & remedy.needs} or {"steer"} & set(usual)
+            seen = _judges(usual, remedy)
             price = SIMPLE * max(sum(new[name].whole for name in seen), CERTAIN)
             left = sum(misfit.whole for misfit in new.values()) + price * (len(remedy.needs) + remedy.strange)
             fits = all(new[name].worst <= 1 - FIT for name in sure)
             if left < least and fits and (wrong or _helps(usual, new, seen, SMALL if seen <= sure else 1.0)):
                 best, least = remedy, left
-    if best is not None and not wrong and not all(_helped(half, best, sure) for half in _halves(values)):
+    if best is not None and not wrong and not all(_helped(half, best) for half in _halves(values)):
         best = None  # a wrong frame is wrong all the time, but wind, gusts and drag are not
     return Judgement(usual, wrong, best)
 
@@ -175,11 +175,19 @@ def _halves(values: Values) -> tuple[Values, Values]:
     return {k: v[:middle] for k, v in values.items()}, {k: v[middle:] for k, v in values.items()}
 
 
-def _helped(values: Values, remedy: Remedy, sure: Collection[str]) -> bool:
+def _judges(usual: Mapping[str, Misfit], remedy: Remedy) -> set[str]:
+    """The relations that judge a remedy. A vehicle need not do what it is told: that only counts where nothing else
+    does.
+    """
+    changed = {name for name in usual if RELATIONS[name] & remedy.needs and name != "steer"}
+    return changed or {"steer"} & set(usual)
+
+
+def _helped(values: Values, remedy: Remedy) -> bool:
     """Whether a remedy brings streams that nearly agree nearer, or if there is too little motion to tell."""
     usual = _misfits(values)
     new = {**usual, **_misfits(remedy.on(values), remedy.needs)}
-    seen = {name for name in sure if RELATIONS[name] & remedy.needs} & set(usual) or {"steer"} & set(usual)
+    seen = _judges(usual, remedy)
     return sum(new[name].whole for name in seen) < max(BETTER_HALF * sum(usual[name].whole for name in seen), SMALL)
 
 

@@ -54,11 +54,6 @@ class SensorNoise:
         return self.rest.std(0)
 
     @property
-    def density(self) -> np.ndarray:
-        """(3,) the density of white noise with this standard deviation and rate, unit/sqrt(Hz): `env.imu`'s."""
-        return self.sigma / np.sqrt(self.rate)
-
-    @property
     def memory(self) -> float:
         """Correlation of a sample's noise with that of the next, -1 to 1, mean of the axes. That of white noise is 0,
         that of a filtered sensor near 1.

@@ -209,21 +209,19 @@ def _flown(kind: str, report: Mapping[str, Any]) -> "tuple[list[str], PageTable]
             f"noise ({', '.join(alarms)}). The standard deviations are widened accordingly."
         )
     ahead = sorted({seconds for each in report["held_out"].values() for seconds in each["seconds"]})
-    rows = tuple(
-        (name.replace("_", " "), *(dict(_errors(each)).get(seconds, "") for seconds in ahead))
-        for name, each in report["held_out"].items()
-    )
+    errors = {name: _errors(each) for name, each in report["held_out"].items()}
+    rows = tuple((name.replace("_", " "), *(told.get(s, "") for s in ahead)) for name, told in errors.items())
     title = "Errors of the file where the fit did not look, before and after (rms)"
     return said, PageTable(title, ("stream", *(f"{seconds:g} s ahead" for seconds in ahead)), rows)
 
 
-def _errors(each: Mapping[str, Any]) -> list[tuple[float, str]]:
+def _errors(each: Mapping[str, Any]) -> dict[float, str]:
     """The errors of a stream by how far ahead, where they were measured."""
-    return [
-        (seconds, f"{_number(before)} → {_number(after)}")
+    return {
+        seconds: f"{_number(before)} → {_number(after)}"
         for seconds, before, after in zip(each["seconds"], each["before"], each["after"], strict=True)
         if before is not None and after is not None
-    ]
+    }
 
 
 def _latency(reports: Reports, identified: Reports) -> "PageSection":
@@ -300,13 +298,14 @@ def _noise(options: AlignmentReport, vehicle: str, console: Terminal) -> "PageSe
     if not found:
         raise ValueError(f"--hover is {options.hover}, which has too few samples; accepted: 10 a second or more")
     trained = {name: float(getattr(env.noise, name)) for name in MEASURED if hasattr(env.noise, name)}
-    trained["specific_force"] = env.imu.accel_noise * float(np.sqrt(_rate(found, "specific_force")))
+    if env.imu.observed:  # as a density
+        trained |= {e.name: env.imu.accel_noise * e.rate**0.5 for e in found if e.name == "specific_force"}
     make_folder(options.out)
     plot_noise(options.out / "noise.png", found, trained)
     rows = tuple(
         (
             each.name.replace("_", " "), f"{each.rate:.0f} Hz", " ".join(map(_number, each.sigma)), MEASURED[each.name],
-            _number(trained[each.name]), _covered(each, trained[each.name]), f"{each.memory:.2f}",
+            *_trained(each, trained.get(each.name)), f"{each.memory:.2f}",
             "" if each.bias is None else " ".join(map(_number, each.bias)),
         )
         for each in found
@@ -323,12 +322,11 @@ def _noise(options: AlignmentReport, vehicle: str, console: Terminal) -> "PageSe
     return PageSection(title, tuple(said), (table,), ((options.out / "noise.png", "Spectra of the noise, by axis."),))
 
 
-def _covered(noise: "SensorNoise", trained: float) -> str:
-    return "covers it" if trained >= max(noise.sigma) else "is smaller"
-
-
-def _rate(noises: "Sequence[SensorNoise]", name: str) -> float:
-    return next((each.rate for each in noises if each.name == name), 0.0)
+def _trained(noise: "SensorNoise", sigma: float | None) -> tuple[str, str]:
+    """The noise of the training, and whether it covers what was measured."""
+    if sigma is None:
+        return "", "not observed"
+    return _number(sigma), "covers it" if sigma >= max(noise.sigma) else "is smaller"
 
 
 def _number(x: float) -> str:

@@ -14,7 +14,6 @@ caption { text-align: left; font-weight: 600; padding: .3em 0; }
 th, td { text-align: left; padding: .2em .9em .2em 0; border-bottom: 1px solid #ddd; vertical-align: top; }
 th { color: #555; font-weight: 600; } .missing { background: #fff4e5; padding: .6em 1em; }
 .about, figcaption { color: #555; } figure { margin: 1em 0; } img { max-width: 100%; }
-code { background: #f2f2f2; padding: .1em .3em; overflow-wrap: anywhere; }
 @media print { h2 { break-after: avoid; } figure, table { break-inside: avoid; } }
 """
 
