@@ -51,7 +51,7 @@ def crazyflie(folder: Path, vehicle: Vehicle) -> list[dict[str, Any]]:
     names = [u.name for u in found.model.unknowns]
     new = merged(vehicle, {e.name: e for e in found.estimates})
     sigma = dict(zip(names, found.sigma, strict=True))
-    plain = found.structures["without delay"][names.index("motor_time_constant")]
+    plain = found.structures.get("without delay", np.full(len(names), np.nan))[names.index("motor_time_constant")]
     half_lost = float(np.mean(found.fit.q[:, 9])) / 2
     seen = judged(found)
     windows = found.windows.some(found.held_out)
@@ -67,6 +67,7 @@ def crazyflie(folder: Path, vehicle: Vehicle) -> list[dict[str, Any]]:
         return {"Crazyflie at 1 kHz": what, "found": value}
 
     return [
+        *(row("refused", str(refusal)) for refusal in found.refusals),
         row("motor lag, without a delay in the model", f"{vehicle.motor_time_constant * np.exp(plain):.3f} s"),
         row("motor lag, and delay", f"{new.motor_time_constant:.3f} s, {new.latency:.3f} s"),
         row(
