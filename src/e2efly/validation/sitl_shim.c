@@ -10,6 +10,10 @@
  *                        was taken in, and when the network thread has come round.
  *
  * Each waits for the other in read(2): one flight keeps one core busy, and an idle one none.
+ *
+ * The firmware's main thread writes into the buffers that its network thread sends from, without a lock: now and then
+ * bytes were lost or came twice. With virtual time, these two threads therefore take turns: the main thread has its
+ * turn until the horizon, the network thread from the return of its select(2) until the next one.
  */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
@@ -17,6 +21,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdint.h>
@@ -45,7 +50,8 @@ struct shared {
 static struct shared *shared;
 static int base, go, poke, done;
 static _Atomic int listening;
-static _Thread_local int network, poked;
+static _Thread_local int network, poked, on_turn;
+static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER; /* of the main thread or of the network thread */
 static _Thread_local _Atomic uint64_t *taken; /* what this thread has received counts here once it has dealt with it */
 
 static ssize_t (*next_sendto)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
@@ -82,6 +88,18 @@ static void tell(void)
 {
     while (write(done, "", 1) < 0)
         if (errno != EINTR) _exit(98);
+}
+
+static void take_turn(void)
+{
+    if (!on_turn) pthread_mutex_lock(&turn);
+    on_turn = 1;
+}
+
+static void end_turn(void)
+{
+    if (on_turn) pthread_mutex_unlock(&turn);
+    on_turn = 0;
 }
 
 static int moved(int port)
@@ -138,6 +156,7 @@ int listen(int fd, int backlog)
 int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct timeval *timeout)
 {
     struct timeval brief = {0, SELECT_US};
+    if (network) end_turn();
     if (taken) {
         atomic_fetch_add(taken, 1);
         taken = NULL;
@@ -164,6 +183,7 @@ int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct ti
         ready--;
         poked = read(poke, &byte, 1) == 1;
     }
+    take_turn();
     return ready;
 }
 
@@ -181,10 +201,12 @@ static uint64_t advance(uint64_t by)
     uint64_t now = atomic_load(&shared->now) + by;
     while (now > atomic_load(&shared->horizon)) {
         atomic_store(&shared->waiting, now);
+        end_turn();
         tell();
         while (read(go, &byte, 1) < 0)
             if (errno != EINTR) _exit(98);
     }
+    take_turn();
     atomic_store(&shared->waiting, 0);
     atomic_store(&shared->now, now);
     return now;
