@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.logs.recording import Stream
 from e2efly.validation.flight_controller import Numbers
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plants.mujoco import MujocoPlant
@@ -28,6 +29,9 @@ DELAY = (0.02, 0.08)
 """Range of the delay from a command to the rate loop, s."""
 SMOOTHED = (0.005, 0.02)
 """Range of the time constant of the filter of the commanded rates whose derivative the feed-forward takes, s."""
+
+POWER = (1.5, 2.0)
+"""Range of the power of a motor output that its thrust rises with."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,8 @@ class HiddenRateLoop:
     def start(self, body_rate: Numbers) -> None:
         """Settle."""
         self._seen, self._integral, self._smooth = np.array(body_rate), np.zeros(3), np.zeros(3)
+        self.asked = np.full(4, self._mass * 9.81 / 4)
+        """(4,) thrusts that were last asked for, N."""
 
     def thrusts(self, command: Numbers, pose: Numbers, motion: Numbers, dt: float) -> list[float]:
         """Thrusts of the rotors, N, for a command of mode ctbr."""
@@ -155,7 +161,8 @@ class HiddenRateLoop:
         low, high = self._low_high
         asked = self._mix @ np.array([self._mass * command[0], *torque])
         asked = asked + max(low - asked.min(), 0.0) - max(asked.max() - high, 0.0)
-        return np.clip(asked, low, high).tolist()
+        self.asked = np.clip(asked, low, high)
+        return self.asked.tolist()
 
 
 class HiddenPlant(MujocoPlant):
@@ -165,6 +172,7 @@ class HiddenPlant(MujocoPlant):
 
     def __init__(self, believed: Vehicle, body: Body, seed: int) -> None:
         self._hidden, self._rng = body, np.random.default_rng([seed, 77])
+        self._power = float(np.random.default_rng([seed, 78]).uniform(*POWER))
         super().__init__(believed)
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
@@ -174,7 +182,7 @@ class HiddenPlant(MujocoPlant):
 
     def reset(self, state: RigidState) -> None:
         """Put the vehicle into a state, in the mean wind."""
-        self._lost, self._gust = np.ones(4), np.zeros(3)
+        self._lost, self._gust, self._time, self._outputs = np.ones(4), np.zeros(3), 0.0, [(0.0, np.zeros(4))]
         super().reset(state)
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
@@ -192,6 +200,14 @@ class HiddenPlant(MujocoPlant):
         across = away - up * (up @ away)
         self.data.qfrc_applied[:3] = -h.rotor_drag * float(np.sum(self.data.act)) * across
         super().step(command, dt)
+        self._time += dt
+        self._outputs.append((self._time, self._controller.asked))
+
+    def outputs(self) -> Stream:
+        """The motor outputs of the flight, 0 to 1: the thrust that is asked for is their `POWER`."""
+        time, asked = zip(*self._outputs[1:], strict=True)
+        top = self._believed.thrust_range[1]
+        return Stream(np.array(time), (np.array(asked) / top) ** (1 / self._power))
 
 
 def _axis(quaternion: Sequence[float]) -> np.ndarray:

@@ -13,7 +13,8 @@ weighed.
 and with the firmware's blackbox laid over it. The delay is compared with the one on the rig's own clock: the age of
 the poses, and the time from a command to the setpoint.
 `--plant structure` flies them in MuJoCo with a structure that no vehicle file tells, behind a rate loop of its own
-(`benchmarks/hidden_bodies.py`). Each is identified from its whole log, with `--bare` also without its rotor speeds.
+(`benchmarks/hidden_bodies.py`). Each is identified from its whole log, with `--bare` also from motor outputs in place
+of rotor speeds and commands, and from commands alone.
 `--plain` hides the structure from the first fit, too: what is then off by three standard deviations wants an alarm.
 `--first` is the seed of the first vehicle. A flight that ends before its excitation does, and a log that is refused,
 are named in the JSON file, and have no errors to count.
@@ -57,7 +58,7 @@ class EndedEarlyError(Exception):
     """The bridge left the excitation before its end: the message says its changes of mode."""
 
 
-ALARM, WITH, WITHOUT = "alarm", "with rotor speeds", "without rotor speeds"
+ALARM, WITH, MOTORS, WITHOUT = "alarm", "with rotor speeds", "with motor outputs", "without either"
 IN_UNIT = {
     "delay": (1e3, "ms"), "motor lag": (1e3, "ms"), "motor lag down": (1e3, "ms"), "gyro filter": (1e3, "ms"),
     "centre of mass": (1e3, "mm"), "product of inertia": (1e6, "kg mm2"), "integral gain": (1.0, "1/s2"),
@@ -109,19 +110,21 @@ def one(vehicle: Vehicle, seed: int) -> Errors:
 def structured(vehicle: Vehicle, seed: int, plain: bool, bare_too: bool) -> dict[str, Errors]:
     """A body of hidden structure, flown in MuJoCo. By what it is identified from."""
     body = drawn(vehicle, np.random.default_rng(seed))
-    flight = fly_excitation(HiddenPlant(vehicle, body, seed), vehicle, body.vehicle.latency, sag=body.sag)
-    whole = sensed(flight, Sensors(), seed)
-    bare = dataclasses.replace(whole, streams={k: s for k, s in whole.streams.items() if k != "rotor_speed"})
+    plant = HiddenPlant(vehicle, body, seed)
+    whole = sensed(fly_excitation(plant, vehicle, body.vehicle.latency, sag=body.sag), Sensors(), seed)
+    commands = {k: s for k, s in whole.streams.items() if k != "rotor_speed"}
+    outputs = {k: s for k, s in commands.items() if k != "command"} | {"motor": plant.outputs()}
+    bare, motors = (dataclasses.replace(whole, streams=streams) for streams in (commands, outputs))
     weighed, out = dataclasses.replace(vehicle, mass=body.vehicle.mass), {}
-    for label, record in ((WITH, whole), (WITHOUT, bare)) if bare_too else ((WITH, whole),):
+    for label, record in ((WITH, whole), (MOTORS, motors), (WITHOUT, bare)) if bare_too else ((WITH, whole),):
         found = identify(weighed, checked([record], weighed), believed=vehicle, plain=plain)
         out[label] = errors(truths(body, vehicle), found) | alarm(found)
     return out
 
 
 def alarm(found: Found) -> Errors:
-    """The largest growth of what the fit leaves over, and whether it alarms."""
-    return {ALARM: (max((m.growth for m in found.misfits), default=1.0), float(any(m.alarming for m in found.misfits)))}
+    """The largest pull of what the fit leaves over, and whether it alarms."""
+    return {ALARM: (max((m.pull for m in found.misfits), default=0.0), float(any(m.alarming for m in found.misfits)))}
 
 
 def errors(body: Vehicle, found: Found, by_firmware: bool = False) -> Errors:

@@ -30,7 +30,7 @@ def identified(folder: Path) -> Path:
         "parameters": {"mass": {"value": 0.9, "sigma": 0.018, "source": STRANGE, "before": 0.75}},
         "flight": {
             "driven_by": "command", "seconds": 18.0, "refused": ["drag_linear_x is not taken"], "held_out": HELD_OUT,
-            "misfit": [{"sensor": "body_rate", "share": 0.5, "growth": 2.3, "alarming": True}],
+            "misfit": [{"sensor": "body_rate", "share": 0.5, "pull": 23.0, "alarming": True}],
         },
     })  # fmt: skip
     with figure(folder / "parameters.png", "", 1.0):
@@ -66,7 +66,7 @@ def test_the_four_stages_are_on_one_page(tmp_path: Path) -> None:
     assert "<script" not in page and "&lt;script&gt;" in page
     assert not re.search(r'(src|href)="(?!data:)', page)
     assert page.count('src="data:image/png;base64,') == 2  # parameters.png and noise.png
-    for text in ("0.9 ± 0.018", "0.5 → 0.25", "drag_linear_x is not taken", "body_rate 2.3 times", "0.045 ± 0.002"):
+    for text in ("0.9 ± 0.018", "0.5 → 0.25", "drag_linear_x is not taken", "body_rate 50 %", "0.045 ± 0.002"):
         assert text in told
     assert re.search(r"mass\s+2 %", told)
     assert "--env.noise.body-rate 0.05" in told  # measured 0.05 rad/s, and the preset robust has 0.02

@@ -9,7 +9,7 @@ import numpy as np
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.found import FittedPart, Found, estimates_of, is_vague, refusals_of, whole_covariance
-from e2efly.alignment.misfit import LeftOver, misfit, motion, white_noise, widened
+from e2efly.alignment.misfit import LeftOver, widened
 from e2efly.alignment.model import (
     FROM_ZERO,
     POSE_DELAY,
@@ -35,12 +35,10 @@ ROTOR_STRUCTURE = STRUCTURE | {
 }  # fmt: skip
 """The same when rotor speeds were measured. Fields that are added: in their unit. Gusts, and the drag of the rotors
 themselves, count as drag of the body."""
-MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.01, "inertia": 0.015}
-"""The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so is
-the accelerometer's filter."""
-SLOW_STRUCTURE = STRUCTURE | {"thrust_map": 0.015, "motor_time_constant": 0.05}
-"""The same when motor outputs are logged so rarely that they are interpolated between samples."""
-STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": SLOW_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
+MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.035, "inertia": 0.02, "torque_ratio": 0.1, "motor_time_constant": 0.12}
+"""The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so are
+one lag up and down, and the accelerometer's filter. Measured on the same vehicles as `PULLED` in `misfit`."""
+STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": MOTOR_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
 LEAST = 1.5
@@ -48,6 +46,8 @@ LEAST = 1.5
 refused by its standard deviation."""
 TORQUES = 200.0
 """Sampling rate of motor outputs and rotor speeds from which on they show the torques on the body, Hz."""
+GUESSED = 0.2
+"""Standard deviation of a moment of inertia that is guessed by the two others, relative."""
 NEAR, REFITS = 1.0, 2
 """`NEAR`: the number of standard deviations by which the other unknowns may change when refused ones are set to the
 values of the file; beyond it, the fit is repeated. Those standard deviations hold for known refused ones. `REFITS`: the
@@ -155,16 +155,13 @@ def identify(
     seen = windows.some(~held_out)
     absent = np.array([plain and unknown.absent(vehicle) for unknown in model.unknowns])
 
-    def fitted(start: np.ndarray, fixed: np.ndarray) -> tuple[Fit, list[LeftOver]]:
-        found = (
-            solved(model, seen, records, fixed)
-            if driver == "rotor_speed"
-            else fit(model, seen, start, told=told, fixed=fixed)
-        )
-        return found, misfits(model, found, seen, records)
+    def fitted(start: np.ndarray, fixed: np.ndarray) -> Fit:
+        if driver == "rotor_speed":
+            return solved(model, seen, records, fixed)
+        return fit(model, seen, start, told=told, fixed=fixed)
 
-    found, left = fitted(np.zeros(len(absent)) if driver == "rotor_speed" else begin(model, seen), absent)
-    sigma = sigmas(model, found, [] if step else left)
+    found = fitted(np.zeros(len(absent)) if driver == "rotor_speed" else begin(model, seen), absent)
+    sigma = sigmas(model, found, () if step else found.misfits)
     impossible = _impossible(model, found.p)
     refused = absent | impossible | _taken_back(model, found.p, sigma)
     p, known = _given(found.p, whole_covariance(found, sigma), refused)
@@ -174,8 +171,8 @@ def identify(
         if not refused.any() or (near and not unclear):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
-        found, left = fitted(np.where(refused, 0.0, found.p), refused)
-        sigma = np.where(refused, sigma, sigmas(model, found, [] if step else left))
+        found = fitted(np.where(refused, 0.0, found.p), refused)
+        sigma = np.where(refused, sigma, sigmas(model, found, () if step else found.misfits))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)
         more = refused | impossible | is_vague(model.base, model.unknowns, p, sigma)
@@ -188,11 +185,11 @@ def identify(
         spread = np.sqrt(np.mean([(each - p) ** 2 for each in structures.values()], 0))
         sigma = np.where(refused, sigma, np.hypot(sigma, spread))
     if step:  # a rate loop of another kind has gains that come nearest, too: it widens, and refuses none
-        sigma = np.where(refused, sigma, sigmas(model, found, left))
+        sigma = np.where(refused, sigma, sigmas(model, found, found.misfits))
     refusals = refusals_of(model.base, model.unknowns, sigma, refused & ~absent, impossible)
     source = f"{', '.join(r.path.name for r in records)}; {'step' if step else 'flight'}"
     estimates = estimates_of(model.base, model.unknowns, p, sigma, refused, source)
-    answer = None
+    answer, left = None, list(found.misfits)
     late = next((i for i, u in enumerate(model.unknowns) if u.field == "latency" and not refused[i]), None)
     answered = None if late is None else (float(model.base.latency) + float(p[late]), float(sigma[late]))
     if driver == "rotor_speed":
@@ -217,13 +214,14 @@ def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[Fitte
     found, left = responded(model, records, plain)
     off = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     off = np.hypot(off, [ROTOR_STRUCTURE.get(u.field, 0.0) for u in RESPONSE])
-    sigma = widened(left, off, np.array([u.prior for u in RESPONSE]))
+    sigma = widened(left, off, [u.field for u in RESPONSE])
     return FittedPart(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
 
 
 def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, source: str) -> list[Estimate]:
     """Rotor speeds show the inertia about z over the torque ratio. It counts as inertia, with the file's torque ratio,
-    unless no rigid body has that inertia: then the moment changes as the two others do, and the rest is the ratio's.
+    unless no rigid body has that inertia: then the moment changes as the two others do, and the rest is the ratio's,
+    which is no better known than that moment (`GUESSED`).
     """
     at = {u.name: i for i, u in enumerate(model.unknowns)}
     z = at["inertia_z"]
@@ -231,25 +229,7 @@ def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, so
         return []
     others = float(np.log(np.mean(np.exp(found.p[[at["inertia_x"], at["inertia_y"]]]))))
     ratio = float(model.base.torque_ratio) * float(np.exp(others - found.p[z]))
-    return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * sigma[z]), source)]
-
-
-def misfits(model: Model, found: Fit, windows: Windows, records: Sequence[Record]) -> list[LeftOver]:
-    """What a fit leaves over of the motion in its windows, by sensor. Attitude and position follow from the others.
-
-    The vibration of a real vehicle grows with the motion, as missing structure does. The velocity is the sum of the
-    specific force without it, and judges in its place where motor outputs drive the fit. For other drivers, whose logs
-    are the ones with which the alarm was calibrated (`benchmarks/identify.py --plant structure`), both judge.
-    """
-    left, followed = [], {"quaternion", "position"}
-    if model.driver in ("motor", "motor_and_rate") and np.isfinite(found.squares.get("velocity", np.nan)).any():
-        followed.add("specific_force")
-    for name in found.squares:
-        if name not in followed:
-            moved = motion(windows.measured[name], windows.there[name])
-            white = np.mean([white_noise(r.streams[name].values) for r in records if r.has(name)])
-            left.append(misfit(name, found.squares[name], moved, float(white)))
-    return left
+    return [Estimate("torque_ratio", np.array(ratio), np.array(ratio * np.hypot(sigma[z], GUESSED)), source)]
 
 
 def _structures(model: Model, windows: Windows, p: np.ndarray, refused: np.ndarray) -> dict[str, np.ndarray]:
@@ -350,4 +330,4 @@ def sigmas(model: Model, found: Fit, left: Sequence[LeftOver]) -> np.ndarray:
     structure, size = STRUCTURES.get(model.driver, STRUCTURE), np.abs(found.p)
     scale = np.where(from_zero(model.base, model.unknowns) > 0, size, 1.0)  # relative, of what is no logarithm too
     off = np.hypot(noise, scale * [structure.get(u.field, 0.0) for u in model.unknowns])
-    return widened(left, off, np.array([u.prior for u in model.unknowns]))
+    return widened(left, off, [u.field for u in model.unknowns])

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from e2efly.alignment.misfit import white_by
 from e2efly.control.vectors import namespace
 
 HUBER = 2.0
@@ -45,6 +46,8 @@ class Solution:
     """(groups, k) of each group, without the prior."""
     curvatures: np.ndarray
     """(groups, k, k) of each group, without the prior."""
+    white: dict[str, np.ndarray]
+    """By sensor, (k,): standard deviations by its white noise alone."""
     prior: np.ndarray
     """(k,) standard deviations about zero."""
     bound: np.ndarray
@@ -92,7 +95,8 @@ def solve(
     x, damping, done = np.maximum(start, least), 1e-3, 0
     r = _numpy(of(jnp.asarray(x), data))
     noise = spread(r)
-    gradients, curvatures = _terms(_numpy(slopes(jnp.asarray(x), data)), r, noise, there)
+    J = _numpy(slopes(jnp.asarray(x), data))
+    gradients, curvatures = _terms(J, r, noise, there)
     for _ in range(iterations):
         done += 1
         H = curvatures.sum(0) + np.diag(prior**-2)
@@ -112,14 +116,16 @@ def solve(
             break
         x, r, damping = x + step, ahead, max(damping / 10, 1e-9)
         noise = spread(r)
-        gradients, curvatures = _terms(_numpy(slopes(jnp.asarray(x), data)), r, noise, there)
+        J = _numpy(slopes(jnp.asarray(x), data))
+        gradients, curvatures = _terms(J, r, noise, there)
         if np.all(np.abs(step) < STILL * np.sqrt(np.diag(np.linalg.inv(H)))):
             break
     H = curvatures.sum(0) + np.diag(prior**-2)
     inverse = np.linalg.inv(H)
     sandwich = inverse @ (correlated(gradients) + np.diag(prior**-2)) @ inverse
     bound = (x <= least) & (gradients.sum(0) + x / prior**2 > 0)
-    return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, prior, bound, done)
+    white = {k: white_by(inverse, _terms({k: own}, r, noise, there)[1].sum(0)) for k, own in J.items()}
+    return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, white, prior, bound, done)
 
 
 def between(found: Solution, part: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from jax import Array
 
 from e2efly.alignment.comparison import turns
 from e2efly.alignment.least_squares import Solution, solve
-from e2efly.alignment.misfit import LeftOver, mean_square, misfit, motion, white_noise
+from e2efly.alignment.misfit import LeftOver, left_over
 from e2efly.alignment.model import Model, Unknown, value_of, vehicle_of
 from e2efly.alignment.windows import GAP, STEP, integral, on_grid, past_steps
 from e2efly.control.vectors import Vec3
@@ -104,11 +104,10 @@ def responded(model: Model, records: Sequence[Record], plain: bool = False) -> t
     held = np.array([plain and (u.absent(model.base) or u.name.startswith("feed_forward")) for u in RESPONSE])
     with jax.enable_x64(True):
         found = solve(_residuals, (model, np.asarray(plain), data), there, start, prior, FLOOR, least, held)
-    noise = float(np.mean([white_noise(record.streams["rotor_speed"].values) for record in records]))
-    return found, [_misfit(name, r, data, noise / 2) for name, r in found.left.items()]  # of four rotors together
+    return found, [_left_over(name, found, data) for name in found.left]
 
 
-def _misfit(name: str, left: np.ndarray, data: dict[str, Any], white: float) -> LeftOver:
+def _left_over(name: str, found: Solution, data: dict[str, Any]) -> LeftOver:
     """What is left over of the mean of the rotors, or of their differences, in quiet and lively parts of windows."""
     n, points = data["there"].shape
     step = points // PIECES
@@ -117,10 +116,10 @@ def _misfit(name: str, left: np.ndarray, data: dict[str, Any], white: float) -> 
         return values.reshape(n, points, -1)[:, : PIECES * step].reshape(n * PIECES, step, -1)
 
     there, spun = parts(data["there"])[..., 0], parts(data["speed"][:, past_steps() :])
-    mean, off = spun.mean(-1, keepdims=True), parts(left)
-    moved = motion(mean if name == "mean" else spun - mean, there)
-    square = mean_square(off.reshape(len(off), -1), np.repeat(there, off.shape[-1], axis=1))
-    return misfit(f"rotor speeds, {name}", square, moved, white)
+    mean = spun.mean(-1, keepdims=True)
+    seen = mean if name == "mean" else spun - mean
+    left, noise, white = found.left[name], found.noise[name], found.white[name]
+    return left_over(f"rotor speeds, {name}", parts(left), seen, there, noise, white)
 
 
 def _residuals(x: Array, data: tuple[Model, Array, dict[str, Any]]) -> dict[str, Array]:

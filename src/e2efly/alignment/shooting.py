@@ -17,6 +17,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.alignment.least_squares import HUBER, huber, jackknife
+from e2efly.alignment.misfit import LeftOver, left_over, white_by
 from e2efly.alignment.model import (
     FACTOR,
     FORCE,
@@ -44,6 +45,9 @@ FLOOR = {
 CALM = 0.9
 """The spread of a sensor is chosen so that this share of the windows is closer to the model. In calm flight, the flight
 controller mainly reacts to disturbances, and only the lively windows show the vehicle itself."""
+JUDGES = (("body_rate",), ("rotor_speed",), ("velocity", "specific_force", "position"))
+"""Sensors that judge the fit: of each group the first that was measured. The velocity is the sum of the specific force,
+without the accelerometer's own faults. The attitude follows from the body rates."""
 FREE = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3 + [0.3] * 4)
 """Standard deviations of a window's start about the measured start."""
 SPUN = 0.003
@@ -74,8 +78,8 @@ class Fit:
     noise: dict[str, float]
     """Spread of each sensor about the fitted model."""
     iterations: int
-    squares: dict[str, np.ndarray]
-    """By sensor, (windows,): mean square of its residuals. NaN where nothing was measured."""
+    misfits: tuple[LeftOver, ...]
+    """What the fit leaves over, by sensor."""
 
 
 def fit(
@@ -167,7 +171,7 @@ def _fit(
         gained = cost - now
         p, q, starts, cost, damping = p + dp, q + dq, moved, now, max(damping / 10, 1e-9)
         told(i, cost)
-        spread = _spread(tried, noise)
+        spread = _spread(_left(tried), windows.there)
         settled = all(abs(np.log(spread[name] / noise[name])) < 0.02 for name in noise)
         still = np.abs(dp) < np.maximum(STILL * np.sqrt(np.diag(np.linalg.inv(H)))[:u], 1e-4)
         if not settled:
@@ -196,10 +200,14 @@ def _fit(
     stiff = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
     stiff[held, held] *= 1e12
     between = jackknife(np.stack([H for H, _ in parts]), np.stack([g for _, g in parts]), stiff, pulled)[:u]
-    left = at(_costs, p, q, starts, noise)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        squares = {name: left[f"square/{name}"] / left[f"sum/{name}"] for name in noise}
-    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], between, noise, i, squares)
+    left = _left(at(_costs, p, q, starts, noise))
+    misfits = []
+    for name in (measured[0] for group in JUDGES if (measured := [name for name in group if name in left])):
+        own, _ = _assembled({"H": terms[f"H/{name}"], "g": terms["g"]}, windows.flight, flights, u, v)
+        white = white_by(inverse, own)[:u]
+        there = windows.there[name]
+        misfits.append(left_over(name, left[name], windows.measured[name], there, noise[name], white))
+    return Fit(p, q, sandwich[:u, :u], inverse[:u, :u], between, noise, i, tuple(misfits))
 
 
 def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
@@ -265,31 +273,32 @@ def _at(
     return {k: x[:n] for k, x in found.items()}
 
 
-def _spread(found: dict[str, np.ndarray], noise: dict[str, float]) -> dict[str, float]:
-    """The spread of each sensor about the model, from what `_costs` says."""
+def _spread(left: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> dict[str, float]:
+    """The spread of each sensor about the model, by its residuals."""
     spread = {}
-    for name in noise:
-        # only windows that have this sensor count
-        squares, there = found[f"square/{name}"], found[f"sum/{name}"]
-        mean = np.where(there > 0, squares / np.maximum(there, 1), np.nan)
-        spread[name] = max(float(np.sqrt(np.nanquantile(mean, CALM))), FLOOR[name])
+    for name, off in left.items():
+        squares = np.sum(off**2, (1, 2)) / np.maximum(there[name].sum(1) * off.shape[-1], 1)
+        seen = there[name].any(1)  # only windows that have this sensor count
+        spread[name] = max(float(np.sqrt(np.quantile(squares[seen], CALM))), FLOOR[name])
     return spread
+
+
+def _left(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The residuals, by sensor, from what `_costs` says."""
+    return {key.removeprefix("left/"): x for key, x in found.items() if key.startswith("left/")}
 
 
 @jax.jit
 def _costs(
     model: Model, p: Array, q: Array, noise: dict[str, Any], free: Array, data: dict[str, Any]
 ) -> dict[str, Array]:
-    """The cost and the squared residuals of each window. It needs no derivatives, which are the most expensive part."""
+    """The cost and the residuals of each window. It needs no derivatives, which are the most expensive part."""
 
     def one(data: dict[str, Any]) -> dict[str, Array]:
         left = _residuals(model, p, q[data["flight"]], data["moved"], data, noise)
         costs = sum(jnp.sum(huber(left[name] / noise[name])) for name in noise)
         told = {"cost": costs * data["counts"] + 0.5 * jnp.sum((data["moved"] / free) ** 2)}
-        for name in noise:
-            told[f"square/{name}"] = jnp.sum(left[name] ** 2) * data["counts"]
-            told[f"sum/{name}"] = jnp.sum(data[f"there/{name}"]) * left[name].shape[-1] * data["counts"]
-        return told
+        return told | {f"left/{name}": left[name] for name in noise}
 
     return jax.vmap(one)(data)
 
@@ -322,7 +331,13 @@ def _window(
     gx = g[k:] + start / free**2
     solved = jnp.linalg.solve(Axx, jnp.concatenate([gx[:, None], A[k:, :k]], 1))
     gain, slope = solved[:, 0], solved[:, 1:]
-    return {"H": A[:k, :k] - A[:k, k:] @ slope, "g": g[:k] - A[:k, k:] @ gain, "gain": gain, "slope": slope}
+    out = {"H": A[:k, :k] - A[:k, k:] @ slope, "g": g[:k] - A[:k, k:] @ gain, "gain": gain, "slope": slope}
+    with_start, row = J[:, :k] - J[:, k:] @ slope, 0
+    for name in noise:  # the part of each sensor
+        points, columns = data[f"measured/{name}"].shape
+        rows = slice(row, row := row + points * (3 if name == "quaternion" else columns))
+        out[f"H/{name}"] = (with_start[rows] * weight[rows, None]).T @ with_start[rows]
+    return out
 
 
 def _residuals(

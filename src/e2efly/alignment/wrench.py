@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.alignment.least_squares import between, solve
-from e2efly.alignment.misfit import mean_square
+from e2efly.alignment.least_squares import Solution, between, solve
+from e2efly.alignment.misfit import LeftOver, left_over
 from e2efly.alignment.model import (
     FACTOR,
     FORCE,
@@ -70,8 +70,25 @@ def solved(model: Model, windows: Windows, records: Sequence[Record], fixed: np.
         between(found, windows.flight)[:u],
         found.noise,
         found.iterations,
-        {name: mean_square(left, there[name]) for name, left in found.left.items()},
+        tuple(_left_over(name, found, data, there[name], u) for name in found.left),
     )
+
+
+def _left_over(name: str, found: Solution, data: dict[str, Any], there: np.ndarray, u: int) -> LeftOver:
+    """What is left over of a sensor. Of the body rates, whose pieces have a free start, by the slopes of the pieces."""
+    n, noise, white = len(there), found.noise[name], found.white[name][:u]
+    off, mask = found.left[name].reshape(n, -1, 3), there.reshape(n, -1, 3)[..., 0]
+    seen = (data[name][:, 1:] + data[name][:, :-1]) / 2 if name == "specific_force" else data[name]
+    if name != "body_rate":
+        return left_over(name, off, seen, mask, noise, white)
+    ramp = np.arange(SHORT) - (SHORT - 1) / 2
+    ramp /= np.sqrt(SHORT * np.sum(ramp**2))
+
+    def slopes(values: np.ndarray) -> np.ndarray:
+        return np.einsum("npsk,s->npk", values.reshape(n, -1, SHORT, 3), ramp)
+
+    whole = mask.reshape(n, -1, SHORT).all(-1).astype(float)
+    return left_over(name, slopes(off), slopes(seen[:, : off.shape[1]]), whole, noise / SHORT**0.5, white, span=1)
 
 
 def measurements(windows: Windows, records: Sequence[Record]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -203,10 +203,10 @@ def _flown(kind: str, report: Mapping[str, Any]) -> "tuple[list[str], PageTable]
 
     said = [f"The fit used {report['seconds']:.0f} s of {kind} logs, driven by {report['driven_by']}."]
     said += [f"Refused: {reason}" for reason in report["refused"]]
-    if alarms := [f"{m['sensor']} {m['growth']:.1f} times" for m in report["misfit"] if m["alarming"]]:
+    if alarms := [f"{m['sensor']} {100 * m['share']:.0f} %" for m in report["misfit"] if m["alarming"]]:
         said.append(
-            f"The model lacks something that this vehicle has: in lively motion, more is left over than the sensors' "
-            f"noise ({', '.join(alarms)}). The standard deviations are widened accordingly."
+            f"The model lacks something that this vehicle has: it leaves a part of the motion unexplained "
+            f"({', '.join(alarms)}). The standard deviations are widened accordingly."
         )
     ahead = sorted({seconds for each in report["held_out"].values() for seconds in each["seconds"]})
     errors = {name: _errors(each) for name, each in report["held_out"].items()}

@@ -202,10 +202,10 @@ def _left_over(found: "Found") -> list[str]:
 def _warn(found: "Found", console: Console) -> None:
     alarms = [each for each in found.misfits if each.alarming]
     if alarms:
+        remedy = " Rotor speeds in the log, 200 times a second, tell forces, rotors and rate loop apart."
         console.print(
             f"The model lacks something that this vehicle has ({'; '.join(map(str, alarms))}). The standard deviations "
-            "are widened accordingly. Rotor speeds in the log, 200 times a second, tell forces, rotors and rate loop "
-            "apart.",
+            f"are widened accordingly.{'' if found.model.driver == 'rotor_speed' else remedy}",
             style="yellow",
         )
 
@@ -264,7 +264,7 @@ def _report(
             },
             "noise": {name: value for part in each.parts for name, value in part.noise.items()},
             "misfit": [
-                {"sensor": m.sensor, "share": m.share, "growth": m.growth, "alarming": m.alarming} for m in each.misfits
+                {"sensor": m.sensor, "share": m.share, "pull": m.pull, "alarming": m.alarming} for m in each.misfits
             ],
             "response": None
             if each.response is None

@@ -150,7 +150,8 @@ def shim() -> Path:
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as text:
             draft = Path(text) / "shim.so"
-            command = ["gcc", "-O2", "-Wall", "-Werror", "-shared", "-fPIC", "-pthread", "-o", str(draft), str(_SHIM), "-ldl"]
+            command = ["gcc", "-O2", "-Wall", "-Werror", "-shared", "-fPIC", "-pthread", "-o", str(draft)]
+            command += [str(_SHIM), "-ldl"]
             _run(command, Path(text), "cannot be given its clock")
             draft.replace(library)
     return library
