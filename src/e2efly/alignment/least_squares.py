@@ -8,6 +8,7 @@ Autocorrelation Consistent Covariance Matrix", 1987).
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import jax
@@ -82,7 +83,7 @@ def solve(
     least = np.full(len(start), -np.inf) if least is None else least
     if held is not None:
         start, prior = np.where(held, 0.0, start), np.where(held, HELD, prior)
-    of, slopes = jax.jit(residuals), jax.jit(jax.jacfwd(residuals))
+    of, slopes = _compiled(residuals)
     counts = {name: max(float(mask.sum()), 1.0) for name, mask in there.items()}
 
     def spread(r: Mapping[str, np.ndarray]) -> dict[str, float]:
@@ -126,6 +127,12 @@ def solve(
     bound = (x <= least) & (gradients.sum(0) + x / prior**2 > 0)
     white = {k: white_by(inverse, _terms({k: own}, r, noise, there)[1].sum(0)) for k, own in J.items()}
     return Solution(x, sandwich, inverse, noise, r, gradients, curvatures, white, prior, bound, done)
+
+
+@lru_cache
+def _compiled(residuals: Callable[[Array, Any], dict[str, Array]]) -> tuple[Any, Any]:
+    """The residuals and their slopes, compiled once."""
+    return jax.jit(residuals), jax.jit(jax.jacfwd(residuals))
 
 
 def between(found: Solution, part: np.ndarray) -> np.ndarray:
