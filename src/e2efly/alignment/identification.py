@@ -161,17 +161,22 @@ def identify(
         return fit(model, seen, start, told=told, fixed=fixed)
 
     found = fitted(np.zeros(len(absent)) if driver == "rotor_speed" else begin(model, seen), absent)
-    sigma = sigmas(model, found, () if step else found.misfits)
+    sigma = sigmas(model, found, ())
     impossible = _impossible(model, found.p)
     refused = absent | impossible | _taken_back(model, found.p, sigma)
+    # What is left over is judged without the unknowns that the flights do not show: with them, it pulls all others.
+    pulled = not step and any(each.pull for each in found.misfits)
+    if pulled and np.all(refused == absent):
+        sigma, pulled = sigmas(model, found, found.misfits), False
+        refused = refused | is_vague(model.base, model.unknowns, found.p, sigma)
     p, known = _given(found.p, whole_covariance(found, sigma), refused)
     for _ in range(REFITS):
         unclear = np.any(is_vague(model.base, model.unknowns, found.p, sigma) & ~refused)
         near = np.all(np.abs(p - found.p)[~refused] < NEAR * known[~refused])
-        if not refused.any() or (near and not unclear):
+        if not refused.any() or (near and not unclear and not pulled):
             break
         # far from the fitted values, the linear correction of `_given` is not valid
-        found = fitted(np.where(refused, 0.0, found.p), refused)
+        found, pulled = fitted(np.where(refused, 0.0, found.p), refused), False
         sigma = np.where(refused, sigma, sigmas(model, found, () if step else found.misfits))
         p = np.where(refused, 0.0, found.p)
         impossible |= _impossible(model, p)

@@ -29,7 +29,7 @@ SHARE = 0.01
 """Share of the motion up to which what is left over counts for nothing: no model of a vehicle is better."""
 ALARM = 10.0
 """Pull from which on the model lacks something."""
-PULLED = dict.fromkeys(("thrust_map", "drag_linear", "drag_quadratic", "latency"), 3.0)
+PULLED: dict[str, float] = dict.fromkeys(("thrust_map", "drag_linear", "drag_quadratic", "latency"), 3.0)
 """Standard deviation of a parameter over its largest pull; `PULLED_ELSE` for all others. Measured on twelve vehicles of
 hidden structure (`benchmarks/identify.py --plant structure --bare`, seeds 0 to 11): a lag that is not the same up and
 down, or an integral part, looks like another lag or gain, more than like another thrust."""
