@@ -89,7 +89,7 @@ this unit times the mass, 1/s and 1/m."""
 NUISANCES: tuple[tuple[str, float], ...] = (
     ("gyro_x", 0.05), ("gyro_y", 0.05), ("gyro_z", 0.05), ("force_x", 0.5), ("force_y", 0.5), ("force_z", 0.3),
     ("pose_delay", 0.05), ("tilt_x", 0.03), ("tilt_y", 0.03), ("sag", 0.1), ("flight_thrust", 0.03),
-    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("force_filter", 0.7), ("wind_x", 0.5),
+    ("uneven_roll", 0.1), ("uneven_pitch", 0.1), ("uneven_yaw", 0.1), ("accelerometer_filter", 0.7), ("wind_x", 0.5),
     ("wind_y", 0.5),
 )  # fmt: skip
 """Nuisance parameters of each flight, with the standard deviation of their priors, in this order: biases of gyroscope
