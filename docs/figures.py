@@ -110,7 +110,7 @@ POLICIES = {
 """The policies of each table: presets by which they were trained, the zoo's, or none."""
 SCRIPTS = {
     "identify_betaflight": "identify.py --plant betaflight",
-    "identify_structure": "identify.py --plant structure --bare --first 1010",
+    "identify_structure": "identify.py --plant structure --bare --first 1110 --vehicles 20",
     "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
     "hil_room": "hil_rehearsal.py --room",
     "zoo_stress_by_sight": "zoo_stress.py --by-sight", "room_flights": "firmware_flights.py --room",
@@ -169,12 +169,11 @@ those of inertia are per axis. The structural part of sigma (`STRUCTURE`) was se
 these. It makes the intervals of thrust, lag, delay and roll and pitch inertia wider than MuJoCo needs,
 because real firmware and real logs differ more from the model. [How it is done](identification.md).""",
     "identify_structure": """
-100 bodies. Each of these has a probability of one half: lag up and down apart, an integral part, a filter and a
-feed-forward in the rate loop, arms up to 7 % longer or shorter, a centre of mass up to 5 mm off, rotors up to 4 %
-apart, products of inertia, rotor drag, sag, wind, gusts. MuJoCo flies them behind a rate loop and a mixer of the
-benchmark's own. Of the 100, MuJoCo refused two (no rigid body has their inertia), and a check of the frames refused
-three logs in error. The check was mended after that, and accepts these three. A torque ratio is only reported where
-no rigid body has the inertia that follows from the file's. [How it is done](identification.md).""",
+20 bodies that were not used for tuning. Each of these has a probability of one half: lag up and down apart, an integral
+part, a filter and a feed-forward in the rate loop, arms up to 7 % longer or shorter, a centre of mass up to 5 mm off,
+rotors up to 4 % apart, products of inertia, rotor drag, sag, wind, gusts. MuJoCo flies them behind a rate loop and a
+mixer of the benchmark's own. Each log is identified three times: whole, from motor outputs in place of commands and
+rotor speeds, and from commands alone. [How it is done](identification.md).""",
     "step_response": """
 VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.
