@@ -59,6 +59,7 @@ static ssize_t (*next_recvfrom)(int, void *, size_t, int, struct sockaddr *, soc
 static int (*next_bind)(int, const struct sockaddr *, socklen_t);
 static int (*next_listen)(int, int);
 static int (*next_select)(int, fd_set *, fd_set *, fd_set *, struct timeval *);
+static int (*next_join)(pthread_t, void **);
 
 __attribute__((constructor)) static void start(void)
 {
@@ -68,6 +69,7 @@ __attribute__((constructor)) static void start(void)
     next_bind = dlsym(RTLD_NEXT, "bind");
     next_listen = dlsym(RTLD_NEXT, "listen");
     next_select = dlsym(RTLD_NEXT, "select");
+    next_join = dlsym(RTLD_NEXT, "pthread_join");
     base = port ? atoi(port) : 0;
     prctl(PR_SET_TIMERSLACK, 1);         /* or its short sleeps last 50 us more */
     prctl(PR_SET_PDEATHSIG, SIGKILL);    /* nobody flies it any more */
@@ -185,6 +187,13 @@ int select(int count, fd_set *readable, fd_set *writable, fd_set *odd, struct ti
     }
     take_turn();
     return ready;
+}
+
+/* The firmware waits for its network thread before it ends, for example at `save`. */
+int pthread_join(pthread_t thread, void **value)
+{
+    end_turn();
+    return next_join(thread, value);
 }
 
 static int main_thread(void)
