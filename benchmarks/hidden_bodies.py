@@ -182,7 +182,8 @@ class HiddenPlant(MujocoPlant):
 
     def reset(self, state: RigidState) -> None:
         """Put the vehicle into a state, in the mean wind."""
-        self._lost, self._gust, self._time, self._outputs = np.ones(4), np.zeros(3), 0.0, [(0.0, np.zeros(4))]
+        self._lost, self._gust, self._time = np.ones(4), np.zeros(3), 0.0
+        self._outputs: list[tuple[float, np.ndarray]] = []
         super().reset(state)
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
@@ -205,7 +206,7 @@ class HiddenPlant(MujocoPlant):
 
     def outputs(self) -> Stream:
         """The motor outputs of the flight, 0 to 1: the thrust that is asked for is their `POWER`."""
-        time, asked = zip(*self._outputs[1:], strict=True)
+        time, asked = zip(*self._outputs, strict=True)
         top = self._believed.thrust_range[1]
         return Stream(np.array(time), (np.array(asked) / top) ** (1 / self._power))
 

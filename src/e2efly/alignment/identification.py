@@ -37,7 +37,8 @@ ROTOR_STRUCTURE = STRUCTURE | {
 themselves, count as drag of the body."""
 MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.035, "inertia": 0.02, "torque_ratio": 0.1, "motor_time_constant": 0.12}
 """The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so are
-one lag up and down, and the accelerometer's filter. Measured on the same vehicles as `PULLED` in `misfit`."""
+one lag up and down, and the accelerometer's filter. Measured on such vehicles as `PULLED` in `misfit`, seeds
+0 to 8."""
 STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": MOTOR_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
