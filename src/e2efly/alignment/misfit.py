@@ -31,8 +31,8 @@ ALARM = 10.0
 """Pull from which on the model lacks something."""
 PULLED: dict[str, float] = dict.fromkeys(("thrust_map", "drag_linear", "drag_quadratic", "latency"), 3.0)
 """Standard deviation of a parameter over its largest pull; `PULLED_ELSE` for all others. Measured on eight vehicles of
-hidden structure (`benchmarks/identify.py --plant structure --bare`, seeds 0 to 3 and 6 to 9): a lag that is not the same
-up and down, or an integral part, looks like another lag or gain, more than like another thrust."""
+hidden structure (`benchmarks/identify.py --plant structure --bare`, seeds 0 to 3 and 6 to 9): a lag that is not the
+same up and down, or an integral part, looks like another lag or gain, more than like another thrust."""
 PULLED_ELSE = 6.0
 
 
