@@ -13,6 +13,7 @@ import pytest
 from e2efly.config import ClutterConfig, ForestConfig
 from e2efly.courses.solids import CLASSES, SIZES
 from e2efly.environment import random_key
+from e2efly.simulation.scenes.faces import bodies
 from e2efly.simulation.scenes.file import load_scene
 from e2efly.simulation.scenes.generate import clutter, corridor, forest, room
 from e2efly.simulation.scenes.scene import Scene, Solids, clearance, distances
@@ -76,6 +77,19 @@ class TestMoving:
         still = scene.at(quarter)
         for time in (NOW, quarter):
             np.testing.assert_allclose(still.solids["sphere"].position(time)[0, 0], [4.0, 1.0, 2.0], atol=1e-6)
+
+
+    def test_what_is_thrown_falls(self) -> None:
+        thrown = dataclasses.replace(
+            ball((4.0, 0.0, 2.0)), velocity=jnp.asarray([[[-8.0, 0.0, 3.0]]]), acceleration=jnp.asarray([[[0, 0, -9.81]]])
+        )
+        scene, late = Scene.of({"sphere": thrown}, 1), jnp.full(1, 0.5)
+        where = [4.0 - 8.0 * 0.5, 0.0, 2.0 + 3.0 * 0.5 - 9.81 * 0.5**2 / 2]
+        np.testing.assert_allclose(scene.solids["sphere"].position(late)[0, 0], where, atol=1e-6)
+        np.testing.assert_allclose(scene.at(late).solids["sphere"].position(NOW)[0, 0], where, atol=1e-6)
+        (body,) = bodies(scene, time=0.5)
+        np.testing.assert_allclose(body.quads.reshape(-1, 3).mean(0), where, atol=0.05)
+        np.testing.assert_allclose(body.moved(0.5), np.subtract(where, [4.0, 0.0, 2.0]), atol=1e-6)
 
 
 class TestGenerators:

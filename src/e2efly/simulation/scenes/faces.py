@@ -1,6 +1,6 @@
 """The faces of solids, for plots, viewers, and all other drawings of worlds that do not use their cameras. NumPy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -30,15 +30,20 @@ class FacesBody:
     """Angular rate on this path, rad/s."""
     label: str = "obstacle"
     """Its semantic class, a name of `solids.CLASSES`."""
+    velocity: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    """Velocity at time 0, beside the path, world, m/s."""
+    acceleration: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    """Acceleration beside the path, world, m/s^2."""
 
     def moved(self, time: float) -> Float[np.ndarray, "3"]:
         """Displacement since time 0, m, at a time, s."""
+        thrown = time * (self.velocity + time / 2 * self.acceleration)
         if self.path is None:
-            return np.zeros(3)
+            return thrown
         quarter, half = len(self.path) // 4, len(self.path) // 2
         middle = (self.path[0] + self.path[half]) / 2
         cosine, sine, angle = self.path[0] - middle, self.path[quarter] - middle, self.rate * time
-        return cosine * (np.cos(angle) - 1) + sine * np.sin(angle)
+        return thrown + cosine * (np.cos(angle) - 1) + sine * np.sin(angle)
 
     @property
     def outline(self) -> Float[np.ndarray, "k 2"]:
@@ -62,8 +67,9 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
     for kind in scene.kinds:
         s = scene.solids[kind]
         turned = np.asarray(to_matrix(s.quaternion[world]), float)
-        centre, cosine, sine, rate, size, colour = (
-            np.asarray(x[world], float) for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour)
+        centre, cosine, sine, rate, size, colour, velocity, acceleration = (
+            np.asarray(x[world], float)
+            for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour, s.velocity, s.acceleration)
         )
         label = np.asarray(s.label[world])
         for i in np.flatnonzero(np.asarray(s.active[world])):
@@ -75,7 +81,9 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
             moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
             path = way[1:] if moves else None
-            found.append(FacesBody(quads + way[0], colour[i], path, float(rate[i]), CLASSES[label[i]]))
+            at = way[0] + time * (velocity[i] + time / 2 * acceleration[i])
+            kind_of = CLASSES[label[i]]
+            found.append(FacesBody(quads + at, colour[i], path, float(rate[i]), kind_of, velocity[i], acceleration[i]))
     return found
 
 

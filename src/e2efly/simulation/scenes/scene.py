@@ -51,10 +51,14 @@ class Solids:
     colour: Float[Array, "n k 3"]
     """RGB in [0, 1]."""
     cosine: Float[Array, "n k 3"]
-    """The path: centre + cosine cos(rate t) + sine sin(rate t), world, m."""
+    """The path: centre + cosine cos(rate t) + sine sin(rate t) + velocity t + acceleration t^2 / 2, world, m."""
     sine: Float[Array, "n k 3"]
     rate: Float[Array, "n k"]
     """Rate of the path, rad/s."""
+    velocity: Float[Array, "n k 3"]
+    """Velocity of the path at time 0, world, m/s: what is thrown."""
+    acceleration: Float[Array, "n k 3"]
+    """Acceleration of the path, world, m/s^2."""
 
     @staticmethod
     def of(
@@ -95,6 +99,8 @@ class Solids:
             cosine=zero,
             sine=zero,
             rate=jnp.zeros((n, k), jnp.float32),
+            velocity=zero,
+            acceleration=zero,
         )
 
     @property
@@ -104,8 +110,9 @@ class Solids:
 
     def position(self, time: Float[Array, " n"]) -> Float[Array, "n k 3"]:
         """Positions of the solids, world, m."""
-        angle = (self.rate * time[:, None])[..., None]
-        return self.centre + self.cosine * jnp.cos(angle) + self.sine * jnp.sin(angle)
+        t, angle = time[:, None, None], (self.rate * time[:, None])[..., None]
+        turned = self.centre + self.cosine * jnp.cos(angle) + self.sine * jnp.sin(angle)
+        return turned + t * (self.velocity + t / 2 * self.acceleration)
 
 
 @jax.tree_util.register_dataclass
@@ -137,8 +144,12 @@ class Scene:
         """The worlds at `time`, s, standing still."""
 
         def still(s: Solids) -> Solids:
-            zero = jnp.zeros_like(s.cosine)
-            return dataclasses.replace(s, centre=s.position(time), cosine=zero, sine=zero, rate=jnp.zeros_like(s.rate))
+            moving = (s.cosine, s.sine, s.rate, s.velocity, s.acceleration)
+            cosine, sine, rate, velocity, acceleration = map(jnp.zeros_like, moving)
+            return Solids(
+                s.position(time), s.quaternion, s.size, s.active, s.label, s.colour, cosine, sine, rate, velocity,
+                acceleration,
+            )  # fmt: skip
 
         return dataclasses.replace(self, solids={kind: still(s) for kind, s in self.solids.items()})
 
