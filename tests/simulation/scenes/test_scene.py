@@ -78,10 +78,11 @@ class TestMoving:
         for time in (NOW, quarter):
             np.testing.assert_allclose(still.solids["sphere"].position(time)[0, 0], [4.0, 1.0, 2.0], atol=1e-6)
 
-
     def test_what_is_thrown_falls(self) -> None:
         thrown = dataclasses.replace(
-            ball((4.0, 0.0, 2.0)), velocity=jnp.asarray([[[-8.0, 0.0, 3.0]]]), acceleration=jnp.asarray([[[0, 0, -9.81]]])
+            ball((4.0, 0.0, 2.0)),
+            velocity=jnp.asarray([[[-8.0, 0.0, 3.0]]]),
+            acceleration=jnp.asarray([[[0, 0, -9.81]]]),
         )
         scene, late = Scene.of({"sphere": thrown}, 1), jnp.full(1, 0.5)
         where = [4.0 - 8.0 * 0.5, 0.0, 2.0 + 3.0 * 0.5 - 9.81 * 0.5**2 / 2]
