@@ -119,13 +119,15 @@ def train(
         return run(setup, folder, reporter, resume, overwrite, traced=True)
 
 
-def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any:
+def make_env(task: TaskLike, num_envs: int | None = None, *, agents: int | None = None, **options: Any) -> Any:
     """The environment of a task.
 
     Args:
         task: the task.
         num_envs: None returns the functional JAX environment, `e2efly.environment.Env`. A number returns a Gymnasium
             vector environment with this many vehicles (needs the extra `gym`).
+        agents: number of vehicles in a world, for a task that has several, such as `swap`. Rows that are next to each
+            other are one world. If omitted, as many as the task's default.
         options: fields of `EnvConfig`, such as vehicle, wind or randomize.
 
     Raises:
@@ -133,6 +135,10 @@ def make_env(task: TaskLike, num_envs: int | None = None, **options: Any) -> Any
     """
     config = preset(task, "ppo", presets.NOMINAL)
     config = dataclasses.replace(config, env=dataclasses.replace(config.env, **options))
+    if agents is not None:
+        if not hasattr(config.task, "agents"):
+            raise ValueError(f"agents is {agents}; accepted: a task with several vehicles; {config.task.name} has one")
+        config = dataclasses.replace(config, task=dataclasses.replace(config.task, agents=agents))
     if num_envs is not None:
         from e2efly.adapters.gym import QuadrotorVectorEnv
 

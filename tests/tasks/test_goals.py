@@ -24,7 +24,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Shape
 from e2efly.policy.odometry import Odometry
 from e2efly.runs import presets
-from e2efly.tasks import TASKS
+from e2efly.tasks import TASKS, company
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.land.goal import LandRoute
 from e2efly.tasks.race import RaceConfig
@@ -305,9 +305,12 @@ def test_what_training_shows_and_judges_flight_shows_and_judges(task: str) -> No
         memory, outcome = lean.advance(memory, *bodies, time, np.asarray(late))
         assert all(isinstance(getattr(outcome, f), np.ndarray) for f in ("terminated", "success", "crashed", "error"))
         np.testing.assert_allclose(outcome.error, wanted.error, atol=2e-4)
+        if lean.neighbours:
+            near = company.nearest(reached.vehicle, env.agents, lean.neighbours)
+            memory = lean.among(memory, jax.tree.map(np.asarray, near))
         row = lean.observe(memory, time, bodies[1])
         np.testing.assert_allclose(row, seen(reached.memory, reached.time, reached.vehicle), atol=2e-4)
-        if config.env.cameras:  # what only cameras see strikes in training alone
+        if config.env.cameras or env.agents > 1:  # what only cameras see, and others, strike in training alone
             assert not np.any(outcome.crashed & ~np.asarray(wanted.crashed) & ~lost)
         else:
             for part in ("terminated", "success", "arrived", "crashed"):

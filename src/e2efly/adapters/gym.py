@@ -66,11 +66,11 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
         """
         self.stepper = Stepper(configured(task), 1, raw)
         self.observation_space, self.action_space = observation_space(self.stepper), action_space()
-        self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
+        self.render_mode, self.metadata = rendering(self.metadata, render_mode, self.stepper)
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """The picture of the vehicle, uint8 (h, w, 3). None without a render mode."""
-        return None if self.render_mode is None else _picture(self.stepper, 0)
+        return None if self.render_mode is None else picture(self.stepper, 0)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start an episode."""
@@ -81,11 +81,11 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Simulate one control step. `info` has `success`, `error` (m) and the weighted reward terms, `reward/NAME`."""
         out, _, final = self.stepper.step(np.asarray(action)[None], restart=False)
-        info = {name: value[0].item() for name, value in _info(out).items()}
+        info = {name: value[0].item() for name, value in info_of(out).items()}
         return self._observation(final), float(out.reward[0]), bool(out.terminated[0]), bool(out.truncated[0]), info
 
     def _observation(self, state: np.ndarray) -> Observation:
-        batch = _observations(self.stepper, state)
+        batch = observations(self.stepper, state)
         return {name: part[0] for name, part in batch.items()} if isinstance(batch, dict) else batch[0]
 
 
@@ -110,41 +110,44 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         """
         self.num_envs = num_envs
         self.stepper = Stepper(configured(task), num_envs, raw)
-        self.render_mode, self.metadata = _rendering(self.metadata, render_mode, self.stepper)
+        self.render_mode, self.metadata = rendering(self.metadata, render_mode, self.stepper)
         self.single_observation_space, self.single_action_space = observation_space(self.stepper), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
         """The picture of each vehicle, uint8 (h, w, 3). None without a render mode."""
-        return None if self.render_mode is None else tuple(_picture(self.stepper, i) for i in range(self.num_envs))
+        return None if self.render_mode is None else tuple(picture(self.stepper, i) for i in range(self.num_envs))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict]:
         """Start all episodes."""
         super().reset(seed=seed, options=options)
         first = self.stepper.reset(_seed(self.np_random))
-        return _observations(self.stepper, first), {}
+        return observations(self.stepper, first), {}
 
     def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Simulate one control step of all vehicles. `info` has the entries of `QuadrotorEnv` for each vehicle, and
-        `final_obs`.
+        `final_obs`. If a world has several vehicles, it has `world`, the number of the world of each.
         """
         out: Any
         out, shown, final = self.stepper.step(actions, restart=True)
-        info: dict[str, Any] = _info(out)
+        info: dict[str, Any] = info_of(out)
+        if self.stepper.env.agents > 1:
+            info["world"] = np.arange(self.num_envs) // self.stepper.env.agents
         if out.done.any():
             info |= {"final_obs": final, "_final_obs": np.asarray(out.done)}
-        return _observations(self.stepper, shown), out.reward, out.terminated, out.truncated, info
+        return observations(self.stepper, shown), out.reward, out.terminated, out.truncated, info
 
 
-def _rendering(metadata: dict[str, Any], mode: str | None, stepper: Stepper) -> tuple[str | None, dict[str, Any]]:
+def rendering(metadata: dict[str, Any], mode: str | None, stepper: Stepper) -> tuple[str | None, dict[str, Any]]:
     """The render mode, and the metadata with the frames per second of the task."""
     if mode not in (None, *metadata["render_modes"]):
         raise ValueError(f"render_mode is {mode!r}; accepted: None, {', '.join(metadata['render_modes'])}")
     return mode, metadata | {"render_fps": round(1 / float(stepper.env.control_period))}
 
 
-def _picture(stepper: Stepper, row: int) -> np.ndarray:
+def picture(stepper: Stepper, row: int) -> np.ndarray:
+    """A picture from behind a vehicle, uint8 (h, w, 3)."""
     if stepper.state is None:
         raise RuntimeError("render before the first reset")
     from e2efly.viewing.watch.film import snapshot  # both import what only pictures need
@@ -157,11 +160,13 @@ def _seed(rng: np.random.Generator) -> int:
     return int(rng.integers(2**32))
 
 
-def _info(out: Any) -> dict[str, np.ndarray]:
+def info_of(out: Any) -> dict[str, np.ndarray]:
+    """What a step tells of each vehicle besides its observation, (n,) each."""
     return {"success": out.success, "error": out.error} | {f"reward/{name}": x for name, x in out.terms.items()}
 
 
-def _observations(stepper: Stepper, state: np.ndarray) -> Observation:
+def observations(stepper: Stepper, state: np.ndarray) -> Observation:
+    """The observations of all vehicles, with their images."""
     if not stepper.env.cameras:
         return state
     return {STATE: state} | {IMAGE.format(i): image for i, image in enumerate(stepper.images())}

@@ -42,6 +42,11 @@ class Stepper:
         if self.n < 1:
             raise ValueError(f"num_envs is {self.n}; accepted: 1 or more")
         self.env = Env.of(self.config.task, self.config.reward, self.config.env)
+        if self.n % self.env.agents:
+            raise ValueError(
+                f"num_envs is {self.n}; accepted: a multiple of {self.env.agents}, the vehicles of a world of "
+                f"{self.config.task.name} (e2efly.adapters.pettingzoo.QuadrotorParallelEnv is one world)"
+            )
         whole = NetworkConfig(pool=(1 << 30, 1 << 30))  # images are returned separately from the features
         views = tuple(View.of(camera, whole) for camera in self.env.cameras)
         self.features = Features(self.env.fields, views)

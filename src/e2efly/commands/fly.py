@@ -3,7 +3,7 @@
 import dataclasses
 import sys
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -31,6 +31,7 @@ from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
 from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
+from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
 from e2efly.flight.publish import Live, targets_of
@@ -72,6 +73,9 @@ class Fly:
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
     path/to/file.py:Name[:...]."""
+    others: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """Pose source of each other vehicle, for policies that observe others, such as those of `swap`. One that is not
+    seen for a second ends the policy's flight."""
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Source of each image that the policy's contract asks for, for policies with cameras: image_0=realsense:[SERIAL],
     v4l2:/dev/videoN?fov=AxB, ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (shared memory that another program
@@ -225,7 +229,9 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
         said = (*loaded.contract.differences(body), f"The course needs {course.needs}.")
         for line in (*said, *goal_notes(loaded.contract, goal)):
             console.print(line, style="dim")
-        runtime = Runtime.of(loaded, course, body, envelope=options.envelope, imu=True, images=True)
+        runtime = Runtime.of(
+            loaded, course, body, envelope=options.envelope, imu=True, images=True, others=bool(options.others)
+        )
     if excited:
         acts, course = excitation(body, settings, getattr(options, excited), options.latency)
         runtime = Runtime.of(acts, course, body, envelope=options.envelope)
@@ -260,6 +266,7 @@ def run(options: Fly) -> int:
         stack.callback(live.close)
         source = open_source(options.pose)
         stack.callback(source.close)
+        others = [stack.enter_context(closing(open_source(uri))) for uri in options.others]
         commands = None if options.commands is None else open_commands(options.commands)
         if commands is not None:
             stack.callback(commands.close)
@@ -277,6 +284,7 @@ def run(options: Fly) -> int:
             client, info, source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=plan.known, cameras=cameras,
             filter=plan.filter, hover=hover,
+            neighbours=Neighbours(others, settings.odometry_timeout) if others else None,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:

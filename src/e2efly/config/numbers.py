@@ -49,6 +49,7 @@ def number(
     rising: bool = False,
     endless: bool = False,
     added: bool = False,
+    sets_shapes: bool = False,
 ) -> Any:
     """A field of one or several numbers, with its default and its rule.
 
@@ -62,12 +63,13 @@ def number(
         rising: whether there are two numbers, the smaller one first.
         endless: whether infinity is accepted, too.
         added: as for `shape`.
+        sets_shapes: whether it determines which program is compiled, as a field made by `shape`.
     """
     whole = _is_whole(default)
     largest = MOST if whole else LARGEST
     least = low if above is None else above + (1 if whole else SMALLEST)
     rule = Rule(max(least, -largest), high if high < math.inf else largest, rising, endless)
-    return dataclasses.field(default=default, metadata={RULE: rule, ADDED: added})
+    return dataclasses.field(default=default, metadata={RULE: rule, ADDED: added, SHAPE: sets_shapes})
 
 
 def shape(default: Any, *, added: bool = False) -> Any:

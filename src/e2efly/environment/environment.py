@@ -275,6 +275,16 @@ class Env:
         """Duration of a control step, s."""
         return self.physics.control_period
 
+    @property
+    def agents(self) -> int:
+        """Number of vehicles in a world: rows of the batch that are next to each other."""
+        return int(getattr(self.task, "agents", 1))
+
+    def whole(self, n: int, parts: int = 1) -> int:
+        """The smallest number of vehicles from n on that makes equally many whole worlds in each of some parts."""
+        each = self.agents * parts
+        return -(-n // each) * each
+
     def is_over(self, time: Float[Array, " n"]) -> Bool[Array, " n"]:
         """Whether the time of an episode is over, at a time since its start, s."""
         return time >= self.task.episode_s - 1e-3 * self.control_period
@@ -288,7 +298,12 @@ class Env:
 
         Returns:
             The state and the first observation.
+
+        Raises:
+            ValueError: for a number of vehicles that is not that of whole worlds.
         """
+        if n % self.agents:
+            raise ValueError(f"n is {n} vehicles; accepted: a multiple of {self.agents}, the vehicles of a world")
         state = self._start(key, n, jnp.zeros((), jnp.int32))
         return self.look(state, jnp.ones(n, bool)), self._observe(state)
 

@@ -40,6 +40,7 @@ from e2efly.flight.pilot.sensing import WATCHED_S, sensing_problem
 from e2efly.flight.pilot.throttle_map import ThrottleHistory, ThrottleMap, learn
 from e2efly.flight.pilot.touch import LAGS
 from e2efly.flight.pose.conditions import Checks
+from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.pace import pace_problem
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.settings import FlightSettings
@@ -96,6 +97,7 @@ class Bridge:
         cameras: Sequence[ImageSource] = (),
         filter: Filter | None = None,
         hover: HoverController | None = None,
+        neighbours: Neighbours | None = None,
     ) -> None:
         """Create a bridge for a vehicle on the ground.
 
@@ -113,6 +115,7 @@ class Bridge:
             cameras: what the policy sees, in the order of the images in its contract.
             filter: keeps the policy inside the fence. None: the guard ends the policy's flight at the fence.
             hover: the controller for take-off, hover and landing. None: the default controller, for this latency.
+            neighbours: the other vehicles. None: nothing is known of any.
         """
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
@@ -124,7 +127,7 @@ class Bridge:
         """The time from the vehicle's motion to its rate loop, s."""
         self.worker, self.log, self.land_now = worker, log, False
         """`land_now`: the operator asks for a landing, as the pilot does with the mission switch."""
-        self.cameras = tuple(cameras)
+        self.cameras, self.neighbours = tuple(cameras), neighbours
         images = () if worker is None else worker.images
         self.seen = tuple(SeenImages(image) for image, _ in zip(images, self.cameras, strict=True))
         """What is known about each camera."""
@@ -214,6 +217,8 @@ class Bridge:
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
         if self.worker is not None:
             self.worker.hear(self.odometry, now)
+        if self.neighbours is not None:
+            self.neighbours.read(now)
         odometry = self.odometry if self.flying else None
         self.seen = tuple(
             quality.see(seen, camera.read(now), now, odometry, self.settings.ground_height, camera.problem)
@@ -267,8 +272,9 @@ class Bridge:
         )
 
     def _blindness(self, now: float) -> str | None:
-        """Why a policy that sees must not act on the newest images. None: it may."""
-        return next((problem for seen in self.seen if (problem := seen.problem(now))), None)
+        """Why a policy must not act on the newest images, or among the other vehicles. None: it may."""
+        lost = None if self.neighbours is None else self.neighbours.problem(now)
+        return next((problem for seen in self.seen if (problem := seen.problem(now))), lost)
 
     @property
     def _unfiltered(self) -> str | None:
@@ -348,7 +354,9 @@ class Bridge:
         if self._blindness(now) is None:
             frames = [seen.frame for seen in self.seen if seen.frame is not None]
             images = [frame.image.astype(np.float32) for frame in frames]
-            if worker.step(odometry, now, slack, self.imu, images) and self.log is not None:
+            near = self.neighbours
+            others = None if near is None else near.nearest(odometry, now, worker.neighbours)
+            if worker.step(odometry, now, slack, self.imu, images, others) and self.log is not None:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
             self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,

@@ -24,7 +24,7 @@ LEAST = 32
 """Minimum number of environments that a device should have."""
 
 
-def share(envs: int, minibatch: int | None, asked: int | None) -> int:
+def share(envs: int, minibatch: int | None, asked: int | None, agents: int = 1) -> int:
     """The number of devices among which to divide `envs` environments: the largest number that divides the work evenly
     and gives each device `LEAST` environments or more.
 
@@ -32,13 +32,16 @@ def share(envs: int, minibatch: int | None, asked: int | None) -> int:
         envs: environments of the run.
         minibatch: samples of a gradient step, if the algorithm has minibatches.
         asked: the number that the user requests. None: as many as possible.
+        agents: vehicles of a world, which are on the same device.
 
     Raises:
         ValueError: when so many devices are not available or do not divide the work.
     """
+    if envs % agents:
+        raise ValueError(f"algo.envs is {envs}; accepted: a multiple of {agents}, the vehicles of a world")
 
     def divides(count: int) -> bool:
-        return envs % count == 0 and (minibatch or 0) % count == 0
+        return envs // agents % count == 0 and (minibatch or 0) % count == 0
 
     found, hosts = len(jax.devices()), jax.process_count()
     if asked is None:

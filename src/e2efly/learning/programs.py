@@ -121,9 +121,9 @@ def _evaluate(setup: Setup) -> Callable[[Env, Weights, jax.Array], Episodes]:
     def evaluate(env: Env, weights: Weights, key: jax.Array) -> Episodes:
         act = acting(actor, weights)
         part = jax.lax.axis_index(AXIS), setup.devices
-        flown = run_episodes(
-            env, act, key, config.eval_episodes, setup.episode_steps, setup.config.task.settling_s, part
-        )
+        # parts of a vehicle alone are filled up by `run_episodes`, so that their starts do not depend on the devices
+        count = config.eval_episodes if env.agents == 1 else env.whole(config.eval_episodes, setup.devices)
+        flown = run_episodes(env, act, key, count, setup.episode_steps, setup.config.task.settling_s, part)
         return jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), flown)
 
     return evaluate

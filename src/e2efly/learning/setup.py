@@ -42,7 +42,7 @@ class Setup:
         algorithm = make_algorithm(config.algo, actor)
         per_update = config.algo.steps
         chunks = -(-config.steps // (per_update * config.chunk))
-        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices)
+        devices = share(config.algo.envs, getattr(config.algo, "minibatch", None), config.devices, env.agents)
         config = dataclasses.replace(config, devices=devices)
         setup = Setup(config, course, algorithm, actor, chunks * config.chunk, devices)
         setup.check()

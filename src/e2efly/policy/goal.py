@@ -11,6 +11,7 @@ from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
 from e2efly.policy.observation import Field
+from e2efly.policy.others import Others
 
 
 class Body(Protocol):
@@ -125,6 +126,15 @@ class Goal:
         """(n, o) the task's own observation fields, for the body state that the policy is given."""
         parts = [value(self, memory, time, state) for _, value in self.shown]
         return parts[0] if len(parts) == 1 else namespace(*parts).concatenate(parts, axis=-1)
+
+    @property
+    def neighbours(self) -> int:
+        """Number of the nearest other vehicles that the policy observes."""
+        return 0
+
+    def among(self, memory: Any, others: Others) -> Any:
+        """The task's state with what is known of the others, for a goal that has `neighbours`."""
+        raise NotImplementedError(f"{type(self).__name__} observes no other vehicles")
 
     @classmethod
     def state(cls, memory: Any) -> Any:

@@ -17,6 +17,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.observation import Field, Known, own_fields
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
+from e2efly.policy.others import Others
 from e2efly.vehicles.vehicle import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
@@ -92,6 +93,7 @@ class Runtime:
         envelope: Envelope | None = None,
         imu: bool = False,
         images: bool = False,
+        others: bool = False,
     ) -> "Runtime":
         """Check that the parts fit together.
 
@@ -103,12 +105,18 @@ class Runtime:
             envelope: the states in which the policy may take over.
             imu: whether `act` will be given IMU measurements.
             images: whether `act` will be given the images that the contract asks for.
+            others: whether `act` will be given the other vehicles that the policy observes.
 
         Raises:
             ValueError: naming everything that does not fit, one item per line.
         """
         contract, envelope = policy.contract, envelope or Envelope()
         reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images)
+        if (count := getattr(course.goal, "neighbours", 0)) and not others:
+            reasons += (
+                f"the policy observes the {count} nearest other vehicles; accepted: with a pose source for each other "
+                "vehicle (fly --others)",
+            )
         for name, value in dataclasses.asdict(envelope).items():
             if value is not None and not value > 0:
                 reasons += (f"envelope.{name} is {value}; accepted: more than 0",)
@@ -238,6 +246,7 @@ def act(
     *,
     seen: Odometry | None = None,
     images: Sequence[np.ndarray] = (),
+    others: Others | None = None,
 ) -> tuple[RuntimeState, Decision]:
     """Call the policy once.
 
@@ -250,6 +259,8 @@ def act(
         seen: the motion that the policy sees, for a simulation that judges by the true motion but shows it with an
             error. None: `odometry`.
         images: the newest image of each camera, in the contract's order.
+        others: the nearest other vehicles, for a goal that has `neighbours`, in the axes of the odometry. None: as
+            last known.
 
     Raises:
         ValueError: for every problem, naming the field if there is one: a non-finite observation or action, an
@@ -260,6 +271,8 @@ def act(
     state = judged(runtime, state, local, now)
     local = local if seen is None else seen.seen_from(course.origin)
     elapsed, body = np.array([now - state.began]), local.batch
+    if others is not None:
+        state = dataclasses.replace(state, task=course.goal.among(state.task, others.seen_from(course.origin)))
     shown = np.asarray(course.goal.observe(state.task, elapsed, body))[0]
     observation = observe(runtime, shown, state.past_actions, local, imu)
     started = time.perf_counter()

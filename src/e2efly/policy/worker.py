@@ -15,6 +15,7 @@ import numpy as np
 from e2efly.config.domain import Domain
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry
+from e2efly.policy.others import Others
 from e2efly.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -58,6 +59,11 @@ class Worker(Protocol):
         """Whether its task is over."""
         ...
 
+    @property
+    def neighbours(self) -> int:
+        """Number of the nearest other vehicles that it observes."""
+        ...
+
     def hear(self, odometry: Odometry | None, now: float) -> None:
         """Receive new data for it. Called at every control step, whatever flies."""
         ...
@@ -75,7 +81,13 @@ class Worker(Protocol):
         ...
 
     def step(
-        self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
+        self,
+        odometry: Odometry,
+        now: float,
+        slack: float,
+        imu: Imu | None,
+        images: Sequence[np.ndarray] = (),
+        others: Others | None = None,
     ) -> bool:
         """Let it decide. Returns whether there is a new decision to record."""
         ...
@@ -129,6 +141,11 @@ class PolicyWorker:
         return self.runtime.course.goal.lands
 
     @property
+    def neighbours(self) -> int:
+        """Number of the nearest other vehicles that the policy observes."""
+        return getattr(self.runtime.course.goal, "neighbours", 0)
+
+    @property
     def done(self) -> bool:
         """Whether its task is over."""
         return self.state is not None and self.state.done
@@ -152,7 +169,13 @@ class PolicyWorker:
         self.state = self.decision = None
 
     def step(
-        self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
+        self,
+        odometry: Odometry,
+        now: float,
+        slack: float,
+        imu: Imu | None,
+        images: Sequence[np.ndarray] = (),
+        others: Others | None = None,
     ) -> bool:
         """Call the policy if it is due within `slack` s. Returns whether it made a new decision. Errors are in
         `problem`.
@@ -165,7 +188,7 @@ class PolicyWorker:
             return False
         started = time.perf_counter()
         self._running = Future()
-        self._questions.put((self._running, (self.runtime, state, odometry, now, imu, images)))
+        self._questions.put((self._running, (self.runtime, state, odometry, now, imu, images, others)))
         try:
             state, self.decision = self._running.result(self.timeout)
         except Late:
@@ -194,8 +217,8 @@ class PolicyWorker:
         while (question := self._questions.get()) is not None:
             future, asked = question
             try:
-                *known, images = asked
-                future.set_result(act(*known, images=images))
+                *known, images, others = asked
+                future.set_result(act(*known, images=images, others=others))
             except Exception as error:  # told to whoever waits for it
                 future.set_exception(error)
 

@@ -170,12 +170,21 @@ def struck(
     It is checked `checks` times, on the cubic through positions and velocities at both ends of the step, without
     gradient.
     """
+    path, share = path_within(before, after, period, checks)
+    nearest = jax.vmap(lambda p, t: jnp.min(gaps(scene, p, t), axis=1))(path, time + period * (share[:, None] - 1))
+    return jnp.any(nearest < radius, axis=0)
+
+
+def path_within(
+    before: State, after: State, period: float, checks: int
+) -> tuple[Float[Array, "s n 3"], Float[Array, " s"]]:
+    """Positions on the cubic through positions and velocities at both ends of a control step, without gradient, and the
+    share of the step at which each is.
+    """
     s = (1 + jnp.arange(checks)) / checks
     h = jnp.stack([(1 + 2 * s) * (1 - s) ** 2, period * s * (1 - s) ** 2, s**2 * (3 - 2 * s), period * s**2 * (s - 1)])
     ends = jnp.stack([before.position, before.velocity, after.position, after.velocity])
-    path = jnp.einsum("hs,hni->sni", h, jax.lax.stop_gradient(ends))
-    nearest = jax.vmap(lambda p, t: jnp.min(gaps(scene, p, t), axis=1))(path, time - period + period * s[:, None])
-    return jnp.any(nearest < radius, axis=0)
+    return jnp.einsum("hs,hni->sni", h, jax.lax.stop_gradient(ends)), s
 
 
 def uniform(key: PRNGKeyArray, n: int, size: int) -> Float[Array, "n size"]:

@@ -18,6 +18,7 @@ from e2efly.flight.flight_loop import LOWEST_RATE, loop_rate
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController
+from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.flight.sight.image_source import ImageSource
@@ -72,6 +73,7 @@ class Session:
         filtered: bool = False,
         hover: HoverController | None = None,
         vehicle: Vehicle | None = None,
+        neighbours: Neighbours | None = None,
     ) -> None:
         """Identify the controller, and put a bridge on its link.
 
@@ -86,7 +88,10 @@ class Session:
         rate = LOWEST_RATE
         if policy is not None and course is not None:
             rate = loop_rate(policy.contract.control_rate_hz)
-            runtime = Runtime.of(policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras))
+            runtime = Runtime.of(
+                policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras),
+                others=neighbours is not None,
+            )  # fmt: skip
             self.worker = PolicyWorker(runtime, PATIENCE_S)
         late = rig.latency + 0.01
         self.commander = None if commands is None else Commander(commands, vehicle, settings, latency=late)
@@ -97,6 +102,7 @@ class Session:
             self.client, self.info, self.source, vehicle, settings,
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
             filter=fastest(Filter.of(vehicle, settings.fence, late))[0] if filtered else None, hover=hover,
+            neighbours=neighbours,
         )  # fmt: skip
         self.flown = FlownSession()
         self.lateness = 0.0

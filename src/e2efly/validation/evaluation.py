@@ -33,7 +33,7 @@ from e2efly.vehicles.vehicle import Controller, Flown, Vehicle
 SEED = 1_000_000
 """Default seed of the starts."""
 BATCH = 250
-"""Number of starts that are flown at once."""
+"""Number of starts that are flown at once, or a few more for whole worlds."""
 FIXED = (
     "vehicle",
     "command_mode",
@@ -403,10 +403,10 @@ def fly_criteria(
     check_time({asked: sum(env.episode_steps for env in envs.values()) * float(episodes) / FASTEST})
     for name, suite in suites.items():
         steps, settle = envs[name].episode_steps, suite.settling_s
-        keys = [random_key(seed, UNSEEN, i) for i in range(-(-episodes // BATCH))]
-        parts = []
-        for key in keys:
-            went, begun = run_stepwise(envs[name], act_of(found.policy), key, BATCH, steps, settle)
+        size, parts = envs[name].whole(BATCH), []
+        for i in range(-(-episodes // size)):
+            key = random_key(seed, UNSEEN, i)
+            went, begun = run_stepwise(envs[name], act_of(found.policy), key, size, steps, settle)
             told = begun.vehicle, drawn_by(envs[name].task, begun.memory)
             parts.append((went, *jax.tree.map(np.asarray, told)))
         flown[name], starts[name], drawn[name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)

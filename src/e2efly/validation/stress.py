@@ -143,34 +143,34 @@ def stress(
 def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) -> dict[str, dict[str, Episodes]]:
     """Fly `episodes` starts per row and criterion."""
     flown: dict[str, dict[str, Episodes]] = {row: {} for row in rows}
-    batches = range(-(-episodes // BATCH))
     for name, suite in found.task.criteria().items():
         env = with_longer_queue(found.environment(suite))
-        steps, settle = env.episode_steps, suite.settling_s
+        steps, settle, size = env.episode_steps, suite.settling_s, env.whole(BATCH)
         for row in rows:
             parts = []
-            for i in batches:
-                draw = draw_of(ROWS.get(row, ROWS["nominal"]), env.physics.flown, seed, i)
+            for i in range(-(-episodes // size)):
+                draw = draw_of(ROWS.get(row, ROWS["nominal"]), env.physics.flown, seed, i, size)
                 draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
                 key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
                 if row in LAWS:
-                    law = law_of(LAWS[row], found.flown.body, seed, i, steps, env.control_period)
+                    law = law_of(LAWS[row], found.flown.body, seed, i, steps, env.control_period, size)
                     parts.append(fly_law(draw.env(env), act, key, draw, law, settle))
                 else:
                     altered = partial(draw.state, env)
-                    parts.append(run_stepwise(draw.env(env), act, key, BATCH, steps, settle, altered)[0])
+                    parts.append(run_stepwise(draw.env(env), act, key, size, steps, settle, altered)[0])
             flown[row][name] = jax.tree.map(lambda *x: np.concatenate(x)[:episodes], *parts)
     return flown
 
 
 def fly_law(env: Env, act: Act, key: Array, draw: Draw, law: LawStep, settle: float) -> Episodes:
-    """`run_stepwise` for `BATCH` episodes under a law, whose control steps are all of the longest episode.
+    """`run_stepwise` for a batch of episodes under a law, whose control steps are all of the longest episode.
 
     Everything else is as in the nominal row, which is `draw`.
     """
-    begin, after = _programs(bool(env.cameras))
+    size = env.whole(BATCH)
+    begin, after = _programs(bool(env.cameras), size)
     flight, felt, sent = begin(env, key, draw, law.at(0))
-    memory = act.begin(BATCH)
+    memory = act.begin(size)
     for k in range(env.episode_steps):
         seen = tuple(np.asarray(image) for image in flight.state.images)
         action, memory = act.act(np.asarray(flight.observation), seen, memory)
@@ -181,11 +181,11 @@ def fly_law(env: Env, act: Act, key: Array, draw: Draw, law: LawStep, settle: fl
 
 
 @cache
-def _programs(seeing: bool) -> tuple[Callable, Callable]:
-    """The compiled programs for `BATCH` episodes under a law: their start and a step."""
+def _programs(seeing: bool, size: int) -> tuple[Callable, Callable]:
+    """The compiled programs for `size` episodes under a law: their start and a step."""
 
     def begin(env: Env, key: Array, draw: Draw, now: LawStep) -> tuple[EpisodesUnderWay, LawMemory, Array]:
-        state, _ = env.reset(key, BATCH)
+        state, _ = env.reset(key, size)
         state = draw.state(env, state)
         vehicle = dataclasses.replace(env.physics.flown, gyro_time_constant=now.gyro_time_constant)
         loop = RateLoop.at_rest(vehicle, state.vehicle.body_rate)  # with a filter, which may be none
@@ -225,7 +225,7 @@ def _programs(seeing: bool) -> tuple[Callable, Callable]:
             shown = dataclasses.replace(shown, imu=dataclasses.replace(state.imu, gyroscope=gyroscope))
         return dataclasses.replace(flight, observation=env.shown(shown, seen)), felt, sent
 
-    options = wide_vectors(BATCH) | ({} if seeing else fast_compile())
+    options = wide_vectors(size) | ({} if seeing else fast_compile())
     first, further = (jax.jit(program, compiler_options=options) for program in (begin, after))
     return first, further
 
@@ -238,10 +238,12 @@ def laws_of(law: StressLaw, vehicle: Vehicle, seed: int, n: int, steps: int, per
     )
 
 
-def law_of(law: StressLaw, vehicle: Vehicle, seed: int, batch: int, steps: int, period: float) -> LawStep:
+def law_of(
+    law: StressLaw, vehicle: Vehicle, seed: int, batch: int, steps: int, period: float, size: int = BATCH
+) -> LawStep:
     """The control steps of a law for a batch of the starts of a seed. The vehicle is the nominal one."""
     rng = np.random.default_rng([seed, UNSEEN, batch, len(LAWS), list(LAWS).index(law.name)])
-    return steps_of(law, LawSetting(vehicle, rng, BATCH, steps, period))
+    return steps_of(law, LawSetting(vehicle, rng, size, steps, period))
 
 
 def draws(row: StressRow, vehicle: Vehicle, seed: int, n: int) -> Draw:
@@ -250,7 +252,7 @@ def draws(row: StressRow, vehicle: Vehicle, seed: int, n: int) -> Draw:
     return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 
 
-def draw_of(row: StressRow, vehicle: Vehicle, seed: int, batch: int) -> Draw:
+def draw_of(row: StressRow, vehicle: Vehicle, seed: int, batch: int, size: int = BATCH) -> Draw:
     """A batch of episodes of a row."""
     rng = np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])
-    return Draw.of(row, vehicle, rng, BATCH)
+    return Draw.of(row, vehicle, rng, size)

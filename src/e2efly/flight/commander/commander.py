@@ -18,6 +18,7 @@ from e2efly.flight.pilot.hover import controlled, flight_gains, rates_of
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
+from e2efly.policy.others import Others
 from e2efly.policy.runtime import Decision, Envelope, Imu, beyond
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -81,6 +82,8 @@ class Commander:
     """It never ends its flight or lands by itself. The pilot ends the flight and lands."""
     native_id: int | None = None
     """It has no thread."""
+    neighbours = 0
+    """It is told of no other vehicles."""
 
     def __init__(
         self,
@@ -141,14 +144,20 @@ class Commander:
         self.state = self.decision = None
 
     def step(
-        self, odometry: Odometry, now: float, slack: float, imu: Imu | None, images: Sequence[np.ndarray] = ()
+        self,
+        odometry: Odometry,
+        now: float,
+        slack: float,
+        imu: Imu | None,
+        images: Sequence[np.ndarray] = (),
+        others: Others | None = None,
     ) -> bool:
         """Convert the newest command to collective thrust and body rates. Returns whether a message has come since the
         last step.
 
         If there is no command to fly by, `problem` says why.
         """
-        del slack, imu, images
+        del slack, imu, images, others
         command, before = self.stream.command, self.state
         if before is None:
             return False

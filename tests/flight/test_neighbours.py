@@ -1,0 +1,96 @@
+"""The other vehicles of a flight: who is near, and what is shown of one that is lost."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import e2efly
+from e2efly.flight.pose.neighbours import FASTEST, LEAST, LOST_S, Neighbours
+from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.policy.odometry import Odometry, Sample
+from e2efly.policy.others import FAR
+from e2efly.policy.runtime import Runtime
+from e2efly.tasks.swap.goal import SwapRoute
+from e2efly.vehicles.loading import load_vehicle
+
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def flying(place: Any, velocity: Any = (0.0, 0.0, 0.0), until: float = np.inf) -> PlantSource:
+    """A vehicle that flies straight on from a place, and is seen until a time."""
+
+    def samples(now: float) -> list[Sample]:
+        if now > until:
+            return []
+        at = np.add(place, np.multiply(now, velocity)) + 1e-6 * np.sin(1e3 * now)  # no pose repeats bit for bit
+        return [Sample(now, at, LEVEL, velocity=np.array(velocity, float))]
+
+    return PlantSource(samples, "other")
+
+
+def here(now: float, place: Any = (0.0, 0.0, 1.0)) -> Odometry:
+    return Odometry(now, np.array(place, float), np.zeros(3), LEVEL, np.zeros(3))
+
+
+def seen(*sources: PlantSource, until: float = 1.0) -> Neighbours:
+    """Others that were read at 100 Hz."""
+    found = Neighbours(sources, 0.1)
+    for i in range(1, round(100 * until) + 1):
+        found.read(i / 100)
+    return found
+
+
+def test_the_nearest_come_first_and_who_is_not_there_is_far() -> None:
+    found = seen(flying((3, 0, 1)), flying((0, 1, 1), (0, 0.5, 0)))
+    others = found.nearest(here(1.0), 1.0, 3)
+    np.testing.assert_allclose(others.position[0, :2], [[0, 1.5, 1], [3, 0, 1]], atol=0.02)
+    np.testing.assert_allclose(others.velocity[0, :2], [[0, 0.5, 0], [0, 0, 0]], atol=0.05)
+    np.testing.assert_allclose(others.position[0, 2], [0, 0, 1 + FAR])
+    assert found.nearest(here(1.0), 1.0, 1).position.shape == (1, 1, 3)
+
+
+def test_between_two_poses_it_flies_on() -> None:
+    found = seen(flying((0, 0, 1), (2.0, 0, 0)))
+    others = found.nearest(here(1.05, (5, 0, 1)), 1.05, 1)
+    assert others.position[0, 0, 0] == pytest.approx(2.1, abs=0.02)
+
+
+def lost_distance(age: float) -> float:
+    found = seen(flying((4, 0, 1), until=0.5), until=0.5)
+    others = found.nearest(here(0.5 + age), 0.5 + age, 1)
+    return float(np.linalg.norm(others.position[0, 0] - [0, 0, 1]))
+
+
+def test_one_that_is_lost_comes_nearer_and_never_vanishes() -> None:
+    assert lost_distance(0.05) == pytest.approx(4.0, abs=0.01)
+    assert lost_distance(0.3) == pytest.approx(4.0 - FASTEST * 0.2, abs=0.02)
+    assert lost_distance(20.0) == pytest.approx(LEAST, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "found, now, told",
+    [
+        (lambda: seen(flying((3, 0, 1))), 1.0, None),
+        (lambda: seen(flying((3, 0, 1), until=-1.0)), 1.0, "another vehicle, by other, was never seen"),
+        (lambda: seen(flying((3, 0, 1), until=0.5)), 1.0, None),
+        (lambda: seen(flying((3, 0, 1), until=0.5)), 2.0, "was not seen for 1.5 s; accepted: seen within 1 s"),
+    ],
+)
+def test_a_policy_flies_only_among_those_that_are_seen(
+    found: Callable[[], Neighbours], now: float, told: str | None
+) -> None:
+    problem = found().problem(now)
+    assert LOST_S == 1.0 and ((problem is None) if told is None else told in str(problem))
+
+
+def test_a_policy_that_observes_others_needs_their_poses() -> None:
+    vehicle = load_vehicle("vis_r")
+    course = SwapRoute().course(e2efly.tasks.task.Shape(0.05, 0.12), 1 / 30)  # type: ignore[attr-defined]
+
+    class Policy:
+        contract = e2efly.policy.loader.load_policy(e2efly.policy.zoo.policy_file("hover")).contract  # type: ignore[attr-defined]
+
+    with pytest.raises(ValueError, match="the policy observes the 2 nearest other vehicles; accepted: with a pose"):
+        Runtime.of(Policy(), course, vehicle, imu=True)  # type: ignore[arg-type]
