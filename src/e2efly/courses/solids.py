@@ -24,7 +24,7 @@ SIZES = {
 flown through along its x axis."""
 DISC, SQUARE, TRIANGLE = 0, 1, 2
 """Outlines of a pad."""
-CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall")
+CLASSES = ("sky", "ground", "obstacle", "gate", "pad", "wall", "vehicle")
 """Semantic classes."""
 USUAL_CLASS = dict.fromkeys(SIZES, "obstacle") | {"gate": "gate", "pad": "pad"}
 """Class of each kind of solid, unless another is given."""

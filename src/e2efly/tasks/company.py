@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float
 
 from e2efly.policy.others import Others, nobody
 from e2efly.simulation.physics import State
-from e2efly.simulation.scenes.scene import Solids
+from e2efly.simulation.scenes.scene import VEHICLE, Solids
 from e2efly.tasks.task import path_within
 
 jax.tree_util.register_dataclass(Others)
@@ -100,5 +100,5 @@ def spheres(others: Others, time: Float[Array, " n"], radius: float | Array) -> 
     """
     n, k, _ = others.position.shape
     begun = others.position - time[:, None, None] * others.velocity
-    solids = Solids.of("sphere", begun, jnp.broadcast_to(jnp.asarray(radius), (n, k))[..., None])
+    solids = Solids.of("sphere", begun, jnp.broadcast_to(jnp.asarray(radius), (n, k))[..., None], label=VEHICLE)
     return dataclasses.replace(solids, velocity=others.velocity)

@@ -69,7 +69,16 @@ class Starts:
 
 
 def draw_starts(env: Env, n: int, seed: int) -> Starts:
-    """The first `n` starts of a seed. They are those of `e2efly eval`."""
+    """The first `n` starts of a seed. They are those of `e2efly eval`.
+
+    Raises:
+        ValueError: for a task whose worlds have several vehicles: a plant flies one alone.
+    """
+    if env.agents > 1:
+        raise ValueError(
+            f"task.agents is {env.agents}; accepted: a task with one vehicle in a world, as a plant flies one alone "
+            "(`e2efly eval` flies worlds of several)"
+        )
     drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
     vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)

@@ -74,10 +74,10 @@ def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
         env: the environment.
         act: the policy.
         key: random key that decides the starts and all noise.
-        n: number of episodes, which are simulated together.
+        n: number of episodes, which are simulated together. There are a few more for whole worlds of several vehicles.
         steps: largest number of control steps. Longer episodes are cut off.
     """
-    shown = list[tuple[np.ndarray, ...]]()
+    shown, n = list[tuple[np.ndarray, ...]](), env.whole(n)
 
     def watched(observation: Any, images: tuple[Any, ...], memory: Any) -> tuple[Any, Any]:
         shown.append(images)

@@ -19,7 +19,7 @@ from e2efly.courses.solids import CLASSES, USUAL_CLASS
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.shapes import FAR, ROOM, SHAPES
 
-SKY, GROUND, OBSTACLE, GATE, PAD, WALL = range(6)
+SKY, GROUND, OBSTACLE, GATE, PAD, WALL, VEHICLE = range(7)
 """Semantic classes, in the order of `solids.CLASSES`."""
 _BY_CLASS = [
     [0.55, 0.72, 0.92],
@@ -28,6 +28,7 @@ _BY_CLASS = [
     [0.93, 0.45, 0.13],
     [0.95, 0.95, 0.93],
     [0.75] * 3,
+    [0.2, 0.25, 0.3],
 ]
 COLOURS = np.array(_BY_CLASS, np.float32)
 """Default colour of each class, RGB in [0, 1]."""

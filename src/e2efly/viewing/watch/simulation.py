@@ -42,7 +42,7 @@ def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
         scene: the worlds, from the task's simulation class.
         world: index of the world.
     """
-    solids = bodies(scene, world, ceilings=True)
+    solids = [body for body in bodies(scene, world, ceilings=True) if body.label != "vehicle"]  # drawn as they are
     drawn = task.drawing() or ()
     return Stage(vehicle, solids, [thing for thing in drawn if not (solids and isinstance(thing, Face))])  # or twice
 
@@ -149,7 +149,7 @@ class Simulation:
     act: Act
     """The policy. It may be replaced by another policy of the same kind at any time."""
     count: int
-    """Number of vehicles."""
+    """Number of vehicles, or a few more for whole worlds of several."""
     seed: int = 0
     """Seed of the starts."""
     hands: Hands = field(default_factory=Hands)
@@ -157,6 +157,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         self.env = held(self.env)
+        self.count = self.env.whole(self.count)
         self.period = self.env.control_period
         options = wide_vectors(self.count) | ({} if self.env.cameras else fast_compile())
         self._step = jax.jit(_advance, compiler_options=options)

@@ -55,8 +55,11 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
         starts: number of starts.
 
     Raises:
-        ValueError: for a task whose step computes with an operation that the page does not have.
+        ValueError: for a task whose step computes with an operation that the page does not have, and for worlds of
+            several vehicles.
     """
+    if env.agents > 1:
+        raise ValueError(f"task.agents is {env.agents}; accepted: a task with one vehicle in a world: a page shows one")
     begun = beginnings(env, starts)
     first = _row(begun, 0)
     given = named(first)
