@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-import e2efly
 from e2efly.flight.pose.neighbours import FASTEST, LEAST, LOST_S, Neighbours
 from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.policy.goal import Shape
+from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Odometry, Sample
 from e2efly.policy.others import FAR
 from e2efly.policy.runtime import Runtime
+from e2efly.policy.zoo import policy_file
 from e2efly.tasks.swap.goal import SwapRoute
 from e2efly.vehicles.loading import load_vehicle
 
@@ -86,11 +88,6 @@ def test_a_policy_flies_only_among_those_that_are_seen(
 
 
 def test_a_policy_that_observes_others_needs_their_poses() -> None:
-    vehicle = load_vehicle("vis_r")
-    course = SwapRoute().course(e2efly.tasks.task.Shape(0.05, 0.12), 1 / 30)  # type: ignore[attr-defined]
-
-    class Policy:
-        contract = e2efly.policy.loader.load_policy(e2efly.policy.zoo.policy_file("hover")).contract  # type: ignore[attr-defined]
-
+    policy, course = load_policy(policy_file("hover")), SwapRoute().course(Shape(0.05, 0.12), 1 / 30)
     with pytest.raises(ValueError, match="the policy observes the 2 nearest other vehicles; accepted: with a pose"):
-        Runtime.of(Policy(), course, vehicle, imu=True)  # type: ignore[arg-type]
+        Runtime.of(policy, course, load_vehicle("vis_r"), imu=True)

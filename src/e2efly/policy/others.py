@@ -12,6 +12,9 @@ from e2efly.policy.observation import Field
 
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
+AHEAD = 1.0
+"""Time within which the others come nearest that a vehicle observes, s. Of two vehicles at the same distance, the one
+that approaches counts as nearer."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,19 @@ class Others:
         return Others(origin.seen(self.position), origin.seen_vectors(self.velocity))
 
 
+def approach(offset: tuple[Array, ...], motion: tuple[Array, ...]) -> Array:
+    """Squared distance at the closest approach within `AHEAD`, m^2, if both vehicles fly straight on.
+
+    Args:
+        offset: x, y, z of the other's position minus the vehicle's, m.
+        motion: x, y, z of its velocity minus the vehicle's, m/s.
+    """
+    closing = -sum(p * v for p, v in zip(offset, motion, strict=True))
+    speed = sum(v * v for v in motion)
+    when = (closing / (speed + 1e-9)).clip(0.0, AHEAD)
+    return sum((p + when * v) ** 2 for p, v in zip(offset, motion, strict=True))
+
+
 def nobody(n: int, count: int, like: Array) -> Others:
     """No other vehicle: all are `FAR` above, at rest. The library is that of `like`."""
     zero = namespace(like).zeros((n, count, 3))
@@ -44,10 +60,9 @@ def nobody(n: int, count: int, like: Array) -> Others:
 
 def others_fields(count: int) -> tuple[Field, Field]:
     """The fields of the observation for the `count` nearest other vehicles: `Others.offsets` and `Others.motion`."""
+    where = f"positions of the {count} others that come nearest within a second, minus the vehicle's"
+    motion = "velocities of the same others, minus the vehicle's"
     return (
-        Field("others", 3 * count, "world", "m", 2.0, f"positions of the {count} nearest others minus the vehicle's"),
-        Field(
-            "others_velocity", 3 * count, "world", "m/s", 2.0,
-            f"velocities of the {count} nearest others minus the vehicle's",
-        ),
-    )  # fmt: skip
+        Field("others", 3 * count, "world", "m", 2.0, where),
+        Field("others_velocity", 3 * count, "world", "m/s", 2.0, motion),
+    )

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from e2efly.policy.others import Others, nobody
+from e2efly.policy.others import Others, approach, nobody
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import VEHICLE, Solids
 from e2efly.tasks.task import path_within
@@ -32,7 +32,7 @@ def squared_distances(position: Float[Array, "n 3"], agents: int) -> Float[Array
 
 
 def nearest(body: Any, agents: int, count: int) -> Others:
-    """The nearest others of each vehicle, the nearest first.
+    """The others that come nearest to each vehicle within the next second (`approach`), the nearest first.
 
     Args:
         body: the motion of n vehicles, with `position` and `velocity`.
@@ -40,7 +40,8 @@ def nearest(body: Any, agents: int, count: int) -> Others:
         count: how many to choose. If there are fewer others, the rest is `nobody`.
     """
     n, there = body.position.shape[0], min(count, agents - 1)
-    away = jax.lax.stop_gradient(squared_distances(body.position, agents))
+    away = approach(pairs(body.position, agents), pairs(body.velocity, agents))
+    away = jax.lax.stop_gradient(jnp.where(jnp.eye(agents, dtype=bool), jnp.inf, away))
     motion = jnp.concatenate([body.position, body.velocity], axis=-1).reshape(-1, agents, 6)
     found = []
     for _ in range(there):

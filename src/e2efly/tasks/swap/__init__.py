@@ -35,7 +35,7 @@ class SwapConfig(TaskConfig):
     agents: int = number(8, low=2, high=64, sets_shapes=True)
     """Number of vehicles in a world (sets shapes)."""
     neighbours: int = number(2, low=1, high=63, sets_shapes=True)
-    """Number of nearest others that a vehicle observes (sets shapes)."""
+    """Number of others that a vehicle observes: those that come nearest within the next second (sets shapes)."""
     episode_s: float = 10.0
     """Length of an episode, s."""
     centre: tuple[float, float, float] = number((0.0, 0.0, 2.0), low=-math.inf)
