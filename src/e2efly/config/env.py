@@ -244,6 +244,12 @@ class EnvConfig:
     vehicle's file."""
     wind: float = number(0.0, high=SPEED)
     """Largest wind speed, m/s. The wind is constant in an episode and is drawn uniformly from a ball."""
+    downwash: float = number(0.0, high=3.0, added=True)
+    """Velocity of the air that the other vehicles of a world blow downwards, relative to a turbulent jet of their
+    weight. Only for tasks with several vehicles in a world. 0: none (sets the program)."""
+    ground_effect: float = number(0.0, high=3.0, added=True)
+    """Additional thrust of a rotor near the ground z = 0, relative to the formula of Cheeseman and Bennett. 0: none
+    (sets the program)."""
     disturbance: DisturbanceConfig = DisturbanceConfig()
     """Gusts, uneven rotors, a sagging battery, an offset of the centre of mass, and drifting poses."""
     noise: NoiseConfig = NoiseConfig()

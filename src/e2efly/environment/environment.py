@@ -31,7 +31,7 @@ from e2efly.config import (
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
 from e2efly.control.vectors import unrotate
-from e2efly.environment import disturbance, expert, lost_commands, pose_errors
+from e2efly.environment import air, disturbance, expert, lost_commands, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
 from e2efly.environment.env_state import (
@@ -87,8 +87,8 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "posterior", "wind", "disturbance", "estimate", "link", "noise",
-        "imu", "cameras",
+        "observation_latency_range", "randomize", "posterior", "wind", "downwash", "ground_effect", "disturbance",
+        "estimate", "link", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
 )  # fmt: skip
@@ -114,6 +114,10 @@ class Env:
     """The distribution from which an identified vehicle is drawn. None: the vehicle is not drawn."""
     wind: Any
     """Largest wind speed, m/s; None: still air."""
+    downwash: Any
+    """See `EnvConfig`; None: there is none."""
+    ground_effect: Any
+    """See `EnvConfig`; None: there is none."""
     disturbance: DisturbanceConfig | None
     estimate: EstimateConfig | None
     link: LinkConfig | None
@@ -175,9 +179,14 @@ class Env:
         noisy = config.noise != NoiseConfig()
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
+        flown_task = _flown_task(task, shape, physics)
+        if config.downwash and getattr(flown_task, "agents", 1) == 1:
+            raise ValueError(
+                f"env.downwash is {config.downwash}; accepted: 0, as a world of {task.name} has one vehicle"
+            )
         return Env(
             physics=physics,
-            task=_flown_task(task, shape, physics),
+            task=flown_task,
             weights=dict(reward.weights),
             parameters=dict(reward.parameters),
             center=((low + high) / 2).astype(dtype),
@@ -188,6 +197,8 @@ class Env:
             randomize={name: width for name, width in config.randomize.items() if name != IDENTIFIED},
             posterior=posterior and dataclasses.replace(posterior, root=posterior.root.astype(dtype)),
             wind=config.wind or None,
+            downwash=config.downwash or None,
+            ground_effect=config.ground_effect or None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             estimate=None if config.estimate == EstimateConfig() else config.estimate,
             link=None if config.link == LinkConfig() else config.link,
@@ -217,7 +228,8 @@ class Env:
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
         parts = (self.disturbance, DisturbanceConfig()), (self.estimate, EstimateConfig()), (self.link, LinkConfig())
-        return bool(spread or drawn or self.wind or any((part or none) != none for part, none in parts))
+        air_moves = self.wind or self.downwash or self.ground_effect
+        return bool(spread or drawn or air_moves or any((part or none) != none for part, none in parts))
 
     @property
     def vehicles(self) -> str:
@@ -244,6 +256,8 @@ class Env:
             randomize={name: strength * width for name, width in self.randomize.items()},
             posterior=self.posterior and self.posterior.times(strength),
             wind=self.wind and strength * self.wind,
+            downwash=self.downwash and strength * self.downwash,
+            ground_effect=self.ground_effect and strength * self.ground_effect,
             disturbance=self.disturbance and _times(self.disturbance, strength),
             estimate=self.estimate and _times(self.estimate, strength),
             link=self.link and _times(self.link, strength),
@@ -391,6 +405,13 @@ class Env:
             plant = disturbed.weaker(plant, physics.nominal, physics.mixer.thrust_max)
             physics = disturbed.mixed(physics)
             disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
+        if self.downwash is not None:
+            blown = self.downwash * air.downwash(air.Jet.of(physics.nominal), before, self.agents)
+            wind = blown if wind is None else wind + blown
+        if self.ground_effect is not None:
+            more = air.cushion(air.propeller(physics.nominal), before.position[:, 2]) - 1
+            lifted = jnp.broadcast_to((1 + self.ground_effect * more)[:, None], (len(more), 4))
+            share = lifted if share is None else share * lifted
         after = step(
             physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share, push=push
         )
