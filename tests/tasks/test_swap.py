@@ -11,13 +11,16 @@ import pytest
 from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, random_key
 from e2efly.learning.devices import share
+from e2efly.learning.setup import Setup
 from e2efly.policy.others import FAR
+from e2efly.runs import presets
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import gaps
 from e2efly.tasks import company
 from e2efly.tasks.swap import SwapConfig
 from e2efly.tasks.swap.goal import SwapGoal, SwapMemory
 from e2efly.tasks.task import at_rest
+from e2efly.viewing.web.exported import course
 
 PERIOD = 1 / 30
 
@@ -175,6 +178,13 @@ class TestSwap:
             env.reset(random_key(0), 4)
         with pytest.raises(ValueError, match=r"algo\.envs is 100; accepted: a multiple of 3"):
             share(100, None, None, 3)
+
+    def test_abpt_and_a_page_are_refused(self) -> None:
+        config = presets.preset("swap", "abpt")
+        with pytest.raises(ValueError, match=r"algo is abpt and task.agents 8; accepted: one vehicle in a world"):
+            Setup.of(config).parameters()
+        with pytest.raises(ValueError, match=r"task.agents is 8; accepted: a task with one vehicle in a world"):
+            course(environment(), SwapConfig())
 
     @pytest.mark.parametrize(
         "changes, told",

@@ -87,7 +87,16 @@ class ABPT(Algorithm):
     """Amended back-propagation through time; see the module."""
 
     def init(self, env: Env, config: ABPTConfig, seed: int) -> ABPTParameters:
-        """Fresh networks, made by NumPy."""
+        """Fresh networks, made by NumPy.
+
+        Raises:
+            ValueError: for worlds of several vehicles, as its stored starts are of one vehicle each.
+        """
+        if env.agents > 1:
+            raise ValueError(
+                f"algo is abpt and task.agents {env.agents}; accepted: one vehicle in a world, or another algorithm, "
+                "as abpt starts from stored states of single vehicles"
+            )
         rng = np.random.default_rng(seed)
         policy = self.actor.init(rng, np.asarray(env.hover))
         sizes = (self.actor.features.state_size + env.privileged_size + 4, *self.actor.network.hidden, 1)

@@ -43,11 +43,11 @@ def physics_substeps(vehicles: int, plants: Mapping[str, np.ndarray] | None = No
     return best_rate(vehicles * CALLS * physics.substeps, lambda: jax.block_until_ready(program(*start)))
 
 
-def environment_steps(task: str, envs: int) -> float:
+def environment_steps(task: str | TrainConfig, envs: int) -> float:
     """Environment steps per second with random actions. Everything is included: latency, reward, new starts,
-    randomisation.
+    randomisation. Each vehicle counts, also of a world with several.
     """
-    config = presets.preset(task, "ppo")
+    config = presets.preset(task, "ppo") if isinstance(task, str) else task
     env_config = dataclasses.replace(config.env, randomize={"mass": 0.1, "motor_time_constant": 0.1})
     env = Env.of(config.task, config.reward, env_config)
     devices = share(envs, None, None)

@@ -42,8 +42,8 @@ class FormationFlight:
     """Smallest distance between the centres of two vehicles while the policy flew, m."""
     track: np.ndarray
     """(steps, vehicles, 3) positions while the policy flew, m."""
-    reasons: tuple[str, ...]
-    """The last reason for a change of mode of each."""
+    modes: tuple[str, ...]
+    """The modes of each, with the reason for each mode."""
 
 
 def fly_formation(
@@ -108,14 +108,14 @@ def fly_formation(
         flew = [session.bridge.flight.mode is Mode.POLICY for session in sessions]
         goals = [session.worker.runtime.course.points[0] for session in sessions if session.worker is not None]
         error = [float(np.linalg.norm(np.subtract(at, goal))) for at, goal in zip(track[-1], goals, strict=True)]
-        reasons = tuple("; ".join(map(str, session.bridge.flight.reasons)) for session in sessions)
         landed = []
         for rig, session in zip(rigs, sessions, strict=True):
             rig.set(mission="hover")
             session.fly(2.0)
             landed.append(session.land())
-    positions = np.array(track)
+    positions, changes = np.array(track), [session.flown.changes for session in sessions]
+    modes = tuple(", ".join(f"{mode} ({'; '.join(why)})" for _, mode, why in each) for each in changes)
     pairs = combinations(range(len(rigs)), 2)
     nearest = min(float(np.linalg.norm(positions[:, i] - positions[:, j], axis=-1).min()) for i, j in pairs)
     complete = tuple(bool(a and b and c) for a, b, c in zip(up, flew, landed, strict=True))
-    return FormationFlight(complete, tuple(error), nearest, positions, reasons)
+    return FormationFlight(complete, tuple(error), nearest, positions, modes)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from e2efly.courses.solids import CLASSES, DISC, SQUARE
 from e2efly.simulation.physics.rotation import to_matrix
-from e2efly.simulation.scenes.scene import WALL, Scene
+from e2efly.simulation.scenes.scene import VEHICLE, WALL, Scene
 
 Quads = Float[np.ndarray, "f 4 3"]
 
@@ -55,7 +55,7 @@ class FacesBody:
 
 
 def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = False) -> list[FacesBody]:
-    """The solids of one world at a time, s.
+    """The solids of one world at a time, s. Other vehicles are left out: whoever draws them has their flights.
 
     Args:
         scene: the worlds.
@@ -72,7 +72,7 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour, s.velocity, s.acceleration)
         )
         label = np.asarray(s.label[world])
-        for i in np.flatnonzero(np.asarray(s.active[world])):
+        for i in np.flatnonzero(np.asarray(s.active[world]) & (label != VEHICLE)):
             quads = _quads(kind, size[i]) @ turned[i].T
             low = quads.reshape(-1, 3).min(axis=0)
             if label[i] == WALL and not ceilings and low[2] == low.max():

@@ -213,7 +213,8 @@ def _heading(frame: StageFrame) -> Float[np.ndarray, "2"]:
 def snapshot(stage: Stage, frame: StageFrame, size: tuple[int, int] = SIZE) -> UInt8[np.ndarray, "h w 3"]:
     """The picture of one moment, from behind the first vehicle."""
     shape, radius = quadrotor(stage.vehicle), _radius(stage)
-    soup = _standing(stage) + _moving(stage, frame.time, np.zeros(3)) + _flying(shape, frame, np.zeros((1, 4)), radius)
+    angle = np.zeros((len(frame.position), 4))
+    soup = _standing(stage) + _moving(stage, frame.time, np.zeros(3)) + _flying(shape, frame, angle, radius)
     return picture(soup, *behind(frame.position[0], _heading(frame), radius, stage.ground), stage.ground, size)
 
 

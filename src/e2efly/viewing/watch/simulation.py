@@ -42,16 +42,17 @@ def stage(vehicle: Vehicle, task: TaskConfig, scene: Any, world: int) -> Stage:
         scene: the worlds, from the task's simulation class.
         world: index of the world.
     """
-    solids = [body for body in bodies(scene, world, ceilings=True) if body.label != "vehicle"]  # drawn as they are
+    solids = bodies(scene, world, ceilings=True)
     drawn = task.drawing() or ()
     return Stage(vehicle, solids, [thing for thing in drawn if not (solids and isinstance(thing, Face))])  # or twice
 
 
 def moment(env: Env, task: TaskConfig, state: EnvState, row: int) -> tuple[Stage, StageFrame]:
-    """One vehicle of a batch in its world, to be drawn."""
-    s, goal = state.vehicle, env.task.goal(state.memory, state.time)
+    """One vehicle of a batch in its world, to be drawn, and after it the others of this world."""
+    s, goal, first = state.vehicle, env.task.goal(state.memory, state.time), row - row % env.agents
+    each = [row, *(i for i in range(first, first + env.agents) if i != row)]
     there = (s.position, s.quaternion, s.velocity, s.rotor_speed, goal)
-    position, quaternion, velocity, rotor_speed, aim = (np.asarray(x[row], float)[None] for x in there)
+    position, quaternion, velocity, rotor_speed, aim = (np.asarray(x, float)[each] for x in there)
     frame = StageFrame(float(state.time[row]), position, quaternion, velocity, rotor_speed, aim)
     return stage(env.physics.flown, task, env.task.scene(state.memory), row), frame
 
