@@ -35,6 +35,7 @@ SIGNALS: dict[str, Any] = {
     "desired_velocity": [2.0, 0.0, -2.0],
     "gaps": [0.3, 0.6],
     "closing": [1.5, 4.0],
+    "misses": [0.1, 0.9, 0.4],
     "overhang": [-0.05, 0.01, 0.1],
     "expert_action": [0.6, 0.12, 0.0, 0.5],
 }
@@ -74,6 +75,7 @@ BY_HAND = {
     "vel": -5 / np.sqrt(8),
     "overspeed": -1,
     "avoid": -(0.5**2 + 0.5 * np.log1p(np.exp(-16 * 0.3))) * 2.5 - (0.2**2 + 0.5 * np.log1p(np.exp(-16 * 0.6))) * 5,
+    "apart": -(0.5**2 + 0.2**2),
     "fit": -(0.03 + 0.1),
     "fitlog": -np.log(1 + 0.05 / 0.02) - np.log(1 + 0.11 / 0.02) - np.log(1 + 0.2 / 0.02),
 }
@@ -94,6 +96,7 @@ SINGULAR: dict[str, Any] = {
     "desired_velocity": [0.0] * 3,
     "gaps": [0.0, 0.8],
     "closing": [0.0, 0.0],
+    "misses": [0.6, 0.0, -0.2],
 }
 
 

@@ -57,6 +57,16 @@ class TestCompany:
         found = company.nearest(anywhere(4), 2, 3)
         assert np.all(np.asarray(found.position)[:, 1:, 2] == FAR) and not np.any(np.asarray(found.velocity)[:, 1:])
 
+    def test_the_gap_to_come_is_that_of_straight_flight(self) -> None:
+        two = moving([[0, 0, 0], [2, 0.3, 0]], [[1, 0, 0], [-1.0, 0, 0]])  # they pass each other after a second
+        gaps = np.asarray(company.misses(two, 2, 0.24))
+        assert gaps[0, 1] == gaps[1, 0] == pytest.approx(0.3 - 0.24, abs=1e-4) and gaps[0, 0] == FAR
+        fleeing = company.misses(dataclasses.replace(two, velocity=-two.velocity), 2, 0.24)
+        assert float(fleeing[0, 1]) == pytest.approx(np.hypot(2, 0.3) - 0.24, abs=1e-4)
+        same = moving(np.zeros((2, 3)), np.zeros((2, 3)))
+        slope = jax.grad(lambda p: jnp.sum(company.misses(dataclasses.replace(same, position=p), 2, 0.24)))
+        assert np.all(np.isfinite(slope(same.position)))
+
     def test_all_others_are_all_but_oneself(self) -> None:
         body = anywhere(6)
         found = company.all_others(body, 3)

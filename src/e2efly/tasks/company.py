@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from e2efly.policy.others import Others, approach, nobody
+from e2efly.policy.others import FAR, Others, approach, nobody
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import VEHICLE, Solids
 from e2efly.tasks.task import path_within
@@ -51,6 +51,15 @@ def nearest(body: Any, agents: int, count: int) -> Others:
     absent = nobody(n, count - there, body.position)
     both = jnp.concatenate([*found, jnp.concatenate([absent.position, absent.velocity], axis=-1)], axis=1)
     return Others(both[..., :3], both[..., 3:])
+
+
+def misses(body: Any, agents: int, reach: float | Array) -> Float[Array, "n a"]:
+    """Gap between each vehicle and each of its world at the closest approach within the next second, m, for the reward
+    term `apart`. They touch at a distance of `reach`, m. For a vehicle and itself it is large.
+    """
+    away = approach(pairs(body.position, agents), pairs(body.velocity, agents))
+    own = jnp.eye(agents, dtype=bool)
+    return jnp.where(own, FAR, jnp.sqrt(jnp.where(own, 1.0, away) + 1e-8) - reach).reshape(-1, agents)
 
 
 def all_others(body: Any, agents: int) -> Others:

@@ -85,5 +85,6 @@ class Swap(SwapGoal):
         bodies = company.all_others(jax.lax.stop_gradient(after), a)
         moved = dataclasses.replace(moved, bodies=bodies, time=time, stayed=stayed)
         ends, well = company.any_of_world(one.terminated, a), company.all_of_world(one.success, a) & stayed
-        signals = {"desired_speed": jnp.broadcast_to(self.config.speed, time.shape)}
+        misses = company.misses(after, a, 2 * self.shape.radius)
+        signals = {"desired_speed": jnp.broadcast_to(self.config.speed, time.shape), "misses": misses}
         return moved, dataclasses.replace(one, terminated=ends, success=well, signals=signals)
