@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from e2efly.policy.others import Others
 from e2efly.simulation.scenes.scene import Solids
 from e2efly.tasks.task import Flier
 
@@ -31,6 +32,7 @@ def best_heading(
     speed: Float[Array, " n"],
     radius: float | Array,
     side: float | Array,
+    others: Others | None = None,
 ) -> Float[Array, " n"]:
     """The heading that makes most progress towards a bearing, with distance to trunks and to the sides of the lane.
 
@@ -41,6 +43,7 @@ def best_heading(
         speed: the commanded speed, m/s.
         radius: radius of the vehicle, m.
         side: largest |y| of the lane, which must not be passed, m.
+        others: other vehicles of the same size, as they are now, which fly straight on.
 
     Returns:
         The heading, rad from world x. It has no gradient.
@@ -65,6 +68,10 @@ def best_heading(
         x, y = place[..., 0], place[..., 1]
         distance = jnp.sqrt((x[..., None] - tree_x) ** 2 + (y[..., None] - tree_y) ** 2)
         gap = jnp.minimum(jnp.min(distance - reach, axis=-1), side - jnp.abs(y) - radius)
+        if others is not None:
+            there = others.position[..., :2] + (time + STEP) * others.velocity[..., :2]
+            apart = jnp.linalg.norm(place[:, :, None] - there[:, None], axis=-1)
+            gap = jnp.minimum(gap, jnp.min(apart, axis=-1) - 2 * radius)
         nearness = nearness + jnp.maximum(MARGIN - gap, 0.0) ** 2 / (1 + time / 2)
         free = jnp.where(gap < TOUCH, jnp.minimum(free, time), free)
         return (place, moving, pushed, nearness, free), None

@@ -45,14 +45,15 @@ class Avoid(AvoidGoal):
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), AvoidWorld(speed, trees)
 
     def expert(self, memory: AvoidWorld, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
-        """Velocity, m/s, and yaw, rad, of an expert that knows every tree.
+        """Velocity, m/s, and yaw, rad, of an expert that knows every tree, and all others if there are any.
 
         The yaw is half-way between the bearing of the goal and the heading of the velocity.
         """
         away = self.goal(memory, memory.speed) - flier.position
         bearing = jnp.arctan2(away[:, 1], away[:, 0])
         side = self.config.forest.width / 2
-        heading = best_heading(memory.trees, flier, bearing, memory.speed, self.shape.radius, side)
+        others = getattr(memory, "bodies", None)
+        heading = best_heading(memory.trees, flier, bearing, memory.speed, self.shape.radius, side, others)
         level = memory.speed[:, None] * jnp.stack([jnp.cos(heading), jnp.sin(heading)], axis=-1)
         climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
         return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
