@@ -15,7 +15,7 @@ from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, quantities
 
-SHIPPED = ("crazyflie", "vis_h", "vis_r")
+SHIPPED = ("crazyflie", "hexa", "octo", "vis_h", "vis_r")
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ BROKEN: dict[str, tuple[Callable[[dict], Any], tuple[str, ...]]] = {
     "wrong unit": (lambda t: t["mass"].update(unit="g"), ("mass.unit is 'g'", "accepted: 'kg'")),
     "wrong shape": (lambda t: t["inertia"].update(value=[1e-3, 1e-3]), ("inertia.value", "[0.001, 0.001]", "(3,)")),
     "ragged": (
-        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[[1.0], ", "(4, 2)")
+        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[[1.0], ", "(N, 2)")
     ),
     "list for a number": (lambda t: t["mass"].update(value=[0.75]), ("mass.value is [0.75]", "a number")),
     "text for a number": (lambda t: t["mass"].update(value="heavy"), ("mass.value is 'heavy'", "a number")),
@@ -233,7 +233,7 @@ def test_a_file_with_a_byte_order_mark(tmp_path: Path) -> None:
 
 
 def test_unknown_name() -> None:
-    with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_[hr]'.*crazyflie, vis_h, vis_r"):
+    with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_[hr]'.*octo, vis_h, vis_r"):
         load_vehicle("vis_x")
     with pytest.raises(ValueError, match=r"vehicle file 'nowhere/quad\.toml' does not exist"):
         load_vehicle("nowhere/quad.toml")
