@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from e2efly.control.allocation import THRUST, TILT, YAW, Allocation, nearest
+from e2efly.control.allocation import THRUST, TILT, YAW, Allocation, ThrustLimits, nearest
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import Mixer
 from e2efly.validation.flight_controller import PlainRateLoop
@@ -167,6 +167,8 @@ def test_a_shift_keeps_the_direction_of_the_torque(name: str) -> None:
 def test_numbers_of_a_hexa_by_hand() -> None:
     """Six equal rotors: a thrust beyond all limits is the limit of each, and its torque is none."""
     found = Allocation.of(load_vehicle("hexa"))
+    assert found.descent is not None and found.pull is not None
+    matrices = found.matrix.tolist(), found.descent.tolist(), found.pull.tolist()
     for asked, each in ((60.0, 2.0), (6.0, 1.0)):
-        thrusts = nearest(found.matrix, found.descent, found.pull, np.array([asked, 0.0, 0.0, 0.0]), 0.0, 2.0)
+        thrusts = nearest(matrices, (asked, 0.0, 0.0, 0.0), ThrustLimits(0.0, 2.0, max, min))
         np.testing.assert_allclose(thrusts, each)

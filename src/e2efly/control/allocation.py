@@ -6,6 +6,7 @@ Every number may be a number or an array of the batch's shape, from NumPy or JAX
 
 import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.control.vectors import Array, namespace
+from e2efly.control.vectors import Array
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import MixerRule, Vehicle, allocation_matrix, rotor_arms
 
@@ -27,6 +28,27 @@ EVEN = 1e-9
 """Relative difference of the rotors' shares of pure thrust below which one shift for all of them is pure thrust."""
 Rows = Sequence[Sequence[Array]]
 Choice = Callable[[Array, Array], Array]
+
+
+def _momenta() -> list[float]:
+    """The momentum of each step, by Nesterov's sequence."""
+    found, pace = [], 1.0
+    for _ in range(STEPS):
+        following = (1 + math.sqrt(1 + 4 * pace**2)) / 2
+        found.append((pace - 1) / following)
+        pace = following
+    return found
+
+
+MOMENTA = _momenta()
+
+
+def _dot(row: Sequence[Array], values: Sequence[Array]) -> Array:
+    return reduce(operator.add, (a * b for a, b in zip(row, values, strict=True)))
+
+
+def _repeat(step: Callable[[Any, Any], Any], first: Any, numbers: Sequence[float]) -> Any:
+    return reduce(step, numbers, first)
 
 
 @dataclass(frozen=True)
@@ -81,30 +103,37 @@ class ThrustLimits:
 
 
 def nearest(
-    matrix: Array, descent: Array, pull: Array, wrench: Array, low: Any, high: Any, plain: Array | None = None
-) -> Array:
-    """Thrusts of the rotors by the rule `qp`, (*n, N), N: the least weighted squared error of the wrench inside of the
-    limits. A wrench that the thrusts of smallest norm give inside of the limits is given exactly.
+    matrices: tuple[Rows, Rows, Rows],
+    wrench: Sequence[Array],
+    limits: ThrustLimits,
+    plain: Array | None = None,
+    repeat: Callable[..., Any] = _repeat,
+) -> tuple[Array, ...]:
+    """Thrusts of the rotors by the rule `qp`, N: the least weighted squared error of the wrench inside of the limits.
+
+    A wrench that the thrusts of smallest norm give inside of the limits is given exactly.
 
     Args:
-        matrix: that of the `Allocation`.
-        descent: its descent.
-        pull: its pull.
-        wrench: collective thrust, N, and roll, pitch and yaw torque, N*m, (*n, 4).
-        low: smallest thrust of a rotor, N.
-        high: largest thrust of a rotor, N.
-        plain: 1: each rotor is clipped by itself. 0 or None: the rule is followed. (*n, 1).
+        matrices: matrix, descent and pull of the `Allocation`, row by row.
+        wrench: collective thrust, N, and roll, pitch and yaw torque, N*m.
+        limits: the limits of each thrust.
+        plain: 1: each rotor is clipped by itself. 0 or None: the rule is followed.
+        repeat: (step, first, numbers) -> what `step` makes of `first`, called with one number after the other.
+            `jax.lax.scan` compiles one step in place of all.
     """
-    xp = namespace(wrench, matrix, low)
-    first = xp.clip(wrench @ matrix.T, low, high)
-    drawn = wrench @ pull.T
-    now, ahead, pace = first, first, 1.0
-    for _ in range(STEPS):
-        after = xp.clip(ahead @ descent + drawn, low, high)  # descent is symmetric
-        following = (1 + math.sqrt(1 + 4 * pace**2)) / 2
-        momentum, pace = (pace - 1) / following, following
-        now, ahead = after, after + momentum * (after - now)
-    return now if plain is None else xp.clip(first + (1 - plain) * (now - first), low, high)
+    matrix, descent, pull = matrices
+    first = limits.clip([_dot(row, wrench) for row in matrix])
+    drawn = [_dot(row, wrench) for row in pull]
+
+    def step(thrusts: tuple[tuple[Array, ...], tuple[Array, ...]], momentum: Array) -> Any:
+        now, ahead = thrusts
+        after = limits.clip([_dot(row, ahead) + more for row, more in zip(descent, drawn, strict=True)])
+        return after, tuple(new + momentum * (new - old) for new, old in zip(after, now, strict=True))
+
+    found, _ = repeat(step, (first, first), MOMENTA)
+    if plain is None:
+        return found
+    return limits.clip([f + (1 - plain) * (best - f) for f, best in zip(first, found, strict=True)])
 
 
 def shifted(

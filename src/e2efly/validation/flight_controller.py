@@ -6,12 +6,10 @@ On plain numbers it is four times as fast as on arrays of three. This matters at
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.control.allocation import Allocation, ThrustLimits, nearest, shifted
 from e2efly.validation.plant import PlantMotion
-from e2efly.vehicles.vehicle import Vehicle, inertia_tensor
+from e2efly.vehicles.vehicle import MixerRule, Vehicle, inertia_tensor
 
 Numbers = Sequence[float]
 
@@ -67,8 +65,10 @@ class PlainRateLoop:
         (jx, xy, xz), (_, jy, yz), (*_, jz) = inertia_tensor(vehicle).tolist()
         self._inertia = jx, jy, jz, xy, xz, yz
         self._gains, self._limits = vehicle.rate_gain.tolist(), vehicle.body_rate_max.tolist()
-        self._allocation = Allocation.of(vehicle)
-        self._rows = self._allocation.matrix.tolist()
+        found = Allocation.of(vehicle)
+        self._rule: MixerRule = found.rule
+        self._rows = found.matrix.tolist()
+        self._descent, self._pull = ([] if x is None else x.tolist() for x in (found.descent, found.pull))
         self._thrust_limits = ThrustLimits(*vehicle.thrust_range, larger=max, smaller=min)
         gain, time = vehicle.rate_integral_gain, vehicle.gyro_time_constant
         self._integral_gains = None if gain is None else gain.tolist()
@@ -114,12 +114,11 @@ class PlainRateLoop:
         )
 
     def _mixed(self, collective: float, torque: tuple[float, float, float]) -> list[float]:
-        plain, known, limits = 1.0 if self._plain else None, self._allocation, self._thrust_limits
+        plain, limits = 1.0 if self._plain else None, self._thrust_limits
         wrench = collective, *torque
-        if known.descent is not None and known.pull is not None:
-            asked = np.array(wrench)
-            return nearest(known.matrix, known.descent, known.pull, asked, limits.low, limits.high, plain).tolist()
-        return list(shifted(known.rule, self._rows, wrench, limits, plain))
+        if self._descent:
+            return list(nearest((self._rows, self._descent, self._pull), wrench, limits, plain))
+        return list(shifted(self._rule, self._rows, wrench, limits, plain))
 
 
 def rotor_speed_of(thrust_map: Numbers, thrusts: Numbers) -> list[float]:

@@ -35,6 +35,19 @@ def reached_share(vehicle: Vehicle) -> float:
     return low / most
 
 
+def check_quadrotor(vehicle: Vehicle, what: str) -> None:
+    """Refuse what is not a quadrotor with level rotors, for a part of the program that knows no other.
+
+    Raises:
+        ValueError: naming the vehicle, its rotors, the part and what it accepts.
+    """
+    tilted = "" if vehicle.rotor_axis is None else " tilted"
+    if vehicle.rotor_count != 4 or tilted:
+        raise ValueError(
+            f"vehicle {vehicle.name!r} has {vehicle.rotor_count}{tilted} rotors; accepted by {what}: four level rotors"
+        )
+
+
 def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: str) -> None:
     """Check the optional terms of the physics that a vehicle has. The allocation is the matrix from rotor thrusts to
     collective thrust and torques, (4, N), and the weight in N. `where` names the vehicle's file in the error text.

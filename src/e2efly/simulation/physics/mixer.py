@@ -1,7 +1,9 @@
 """From collective thrust and torque to rotor thrusts, with the flight controller's nominal vehicle."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +11,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.control.allocation import Allocation, ThrustLimits, nearest, shifted
-from e2efly.control.vectors import Vec3, stack
+from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics.airframe import Rotors
 from e2efly.simulation.physics.state import split
 from e2efly.vehicles.vehicle import MixerRule, Vehicle
@@ -67,13 +69,19 @@ class Mixer:
         """Rotor thrusts within the limits, N. Attitude has priority over thrust."""
         wrench = collective, torque.x, torque.y, torque.z
         if self.rule == "qp" and self.descent is not None and self.pull is not None:
-            asked, (low, high) = stack(*wrench), (self.thrust_min, self.thrust_max)
-            plain = None if self.plain is None else jnp.asarray(self.plain)[..., None]
-            with jax.default_matmul_precision("highest"):
-                return split(nearest(self.matrix, self.descent, self.pull, asked, low, high, plain))
-        rows = [split(jnp.asarray(self.matrix[..., i, :])) for i in range(self.matrix.shape[-2])]
-        return shifted(self.rule, rows, wrench, self._limits, self.plain)
+            matrices = _rows(self.matrix), _rows(self.descent), _rows(self.pull)
+            return nearest(matrices, jnp.broadcast_arrays(*wrench), self._limits, self.plain, _scan)
+        return shifted(self.rule, _rows(self.matrix), wrench, self._limits, self.plain)
 
     @property
     def _limits(self) -> ThrustLimits:
         return ThrustLimits(self.thrust_min, self.thrust_max, jnp.maximum, jnp.minimum)
+
+
+def _rows(matrix: np.ndarray | Array) -> list[Rotors]:
+    return [split(jnp.asarray(matrix[..., i, :])) for i in range(matrix.shape[-2])]
+
+
+def _scan(step: Callable[[Any, Any], Any], first: Any, numbers: Sequence[float]) -> Any:
+    paces = jnp.asarray(numbers, first[0][0].dtype)
+    return jax.lax.scan(lambda carry, pace: (step(carry, pace), None), first, paces)[0]
