@@ -16,6 +16,8 @@ from e2efly.simulation.physics.mixer import Mixer
 from e2efly.validation.flight_controller import PlainRateLoop, rotor_speed_of
 from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
+from e2efly.validation.plants.airsim import AirsimPlant
+from e2efly.validation.plants.betaflight import BetaflightPlant
 from e2efly.validation.plants.mujoco import MujocoPlant, vehicle_xml
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.vehicles.gravity import GRAVITY
@@ -62,6 +64,38 @@ def test_rotors_push_and_twist_where_the_vehicle_has_them(vis_r: Vehicle) -> Non
         assert plant.state.velocity[2] / 1e-4 == pytest.approx(thrust.sum() / vis_r.mass - GRAVITY, rel=1e-3)
 
 
+@pytest.mark.usefixtures("x64")
+def test_tilted_rotors_agree_with_our_physics() -> None:
+    """Each rotor by itself, along its axis, with the momentum of the rotors, for half a second of violent thrusts."""
+    hexa, rng = load_vehicle("hexa"), np.random.default_rng(0)
+    axis = rng.normal(0.0, 0.2, (6, 3)) + np.array([0.0, 0.0, 1.0])
+    places = np.column_stack([hexa.rotor_position, rng.uniform(-0.05, 0.05, 6)])
+    vehicle = dataclasses.replace(
+        hexa,
+        rotor_axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
+        rotor_position=places,
+        rotor_inertia=5e-5,
+        centre_of_mass=np.array([0.01, -0.02, 0.01]),
+    )
+    thrusts = np.repeat(rng.uniform(*vehicle.thrust_range, (10, 6)), 50, axis=0)
+    physics = Physics.of(vehicle, "rotor_thrust", "rk4", 1000.0, dtype=np.float64)
+    start, plant = tumbling(), MujocoPlant(vehicle, "rotor_thrust")
+    arrays = start.position, start.velocity, start.quaternion, start.body_rate, np.full(6, vehicle.hover_rotor_speed)
+    ours = fine(physics, State(*(jnp.asarray(x) for x in arrays)), jnp.asarray(thrusts))
+    plant.reset(start)
+    for command in thrusts:
+        plant.step(command, 1e-3)
+    np.testing.assert_allclose(ours.position[-1], plant.state.position, atol=1e-3)
+    np.testing.assert_allclose(ours.velocity[-1], plant.state.velocity, atol=5e-3)
+    np.testing.assert_allclose(ours.body_rate[-1], plant.state.body_rate, atol=2e-2)
+
+
+@pytest.mark.parametrize("plant", [BetaflightPlant, AirsimPlant])
+def test_a_plant_of_quadrotors_refuses_others_by_name(plant: type[Plant]) -> None:
+    with pytest.raises(ValueError, match=rf"vehicle 'hexa' has 6 rotors; accepted by plant '{plant.name}': four level"):
+        plant(load_vehicle("hexa"), "ctbr")  # type: ignore[call-arg]
+
+
 def test_fall_with_rotors_that_spin_down_by_the_closed_form(vis_r: Vehicle) -> None:
     still = dataclasses.replace(vis_r, drag_linear=np.zeros(3), drag_quadratic=np.zeros(3))
     plant, t, lag = MujocoPlant(still), 0.5, vis_r.motor_time_constant
@@ -97,7 +131,7 @@ def fine(physics: Physics, state: State, commands: jax.Array) -> State:
 
 
 @pytest.mark.usefixtures("x64")
-@pytest.mark.parametrize("name", ["vis_r", "crazyflie"])
+@pytest.mark.parametrize("name", ["vis_r", "crazyflie", "hexa", "octo"])
 def test_a_tumbling_second_agrees_with_our_physics_at_the_same_step(name: str) -> None:
     """Same rate loop rate, 1 kHz; RK4 on both sides: what is left is two different programs. Saturates the mixer."""
     vehicle, start = load_vehicle(name), tumbling()
@@ -105,14 +139,15 @@ def test_a_tumbling_second_agrees_with_our_physics_at_the_same_step(name: str) -
     low, high = np.array([0.0, *-vehicle.body_rate_max]), np.array([2 * GRAVITY, *vehicle.body_rate_max])
     commands = np.repeat(rng.uniform(low, high, (20, 4)), 50, axis=0)
     physics = Physics.of(vehicle, "ctbr", "rk4", 1000.0, dtype=np.float64)
-    arrays = (start.position, start.velocity, start.quaternion, start.body_rate, np.full(4, vehicle.hover_rotor_speed))
+    speed = np.full(vehicle.rotor_count, vehicle.hover_rotor_speed)
+    arrays = (start.position, start.velocity, start.quaternion, start.body_rate, speed)
     ours = fine(physics, State(*(jnp.asarray(x) for x in arrays)), jnp.asarray(commands))
     plant, theirs = MujocoPlant(vehicle), []
     plant.reset(start)
     for command in commands:
         plant.step(command, 1e-3)
         theirs.append(plant.state)
-    assert np.max([np.linalg.norm(s.body_rate) for s in theirs]) > 5
+    assert np.max([np.linalg.norm(s.body_rate) for s in theirs]) > (5 if vehicle.rotor_count == 4 else 3.8)
     np.testing.assert_allclose(ours.position, [s.position for s in theirs], atol=1e-3)
     np.testing.assert_allclose(ours.velocity, [s.velocity for s in theirs], atol=5e-3)
     np.testing.assert_allclose(ours.body_rate, [s.body_rate for s in theirs], atol=2e-2)

@@ -15,7 +15,7 @@ from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, quantities
 
-SHIPPED = ("crazyflie", "vis_h", "vis_r")
+SHIPPED = ("crazyflie", "hexa", "octo", "vis_h", "vis_r")
 
 
 @pytest.fixture
@@ -68,12 +68,36 @@ def test_the_papers_table() -> None:
         assert (vehicle.motor_time_constant, vehicle.control_rate, vehicle.torque_ratio) == (0.035, 30.0, 0.016)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ["crazyflie", "vis_h", "vis_r"])
 def test_rotor_order_is_betaflights_and_a_level_quad_has_no_torque(name: str) -> None:
     vehicle = load_vehicle(name)
     np.testing.assert_array_equal(np.sign(vehicle.rotor_position), [[-1, -1], [1, -1], [-1, 1], [1, 1]])
     np.testing.assert_array_equal(vehicle.rotor_spin, [1, -1, -1, 1])
     np.testing.assert_allclose(allocation_matrix(vehicle) @ np.ones(4), [4, 0, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "count"), [("hexa", 6), ("octo", 8)])
+def test_a_wheel_of_rotors_has_no_torque(name: str, count: int, tmp_path: Path) -> None:
+    vehicle = load_vehicle(name)
+    assert (vehicle.rotor_count, vehicle.mixer_rule) == (count, "qp")
+    np.testing.assert_allclose(allocation_matrix(vehicle) @ np.ones(count), [count, 0, 0, 0], atol=1e-6)
+    path, text = tmp_path / "mine.toml", (Path(module.__file__).parent / f"{name}.toml").read_text()
+    for mixer in ("shift", "betaflight"):
+        path.write_text(f'mixer = "{mixer}"\n{text}')
+        assert load_vehicle(path).mixer_rule == mixer
+        assert load_vehicle(path).hash != vehicle.hash
+    for given in ("3", '"quick"'):
+        path.write_text(f"mixer = {given}\n{text}")
+        with pytest.raises(ValueError, match=r"mine\.toml: mixer is .*; accepted: 'shift', 'betaflight', 'qp', or no"):
+            load_vehicle(path)
+    spins = f"value = {[int(x) for x in vehicle.rotor_spin]}"
+    path.write_text(text.replace(spins, "value = [1, -1, 1, -1]"))
+    with pytest.raises(ValueError, match=rf"rotor_position.value has {count} rotors, and rotor_spin.value 4; accepted"):
+        load_vehicle(path)
+    axes = [[0.0, 0.0, 1.0]] * (count - 1) + [[0.0, 0.6, 0.7]]
+    path.write_text(f'{text}\n[rotor_axis]\nvalue = {axes}\nunit = "1"\nsource = "estimated"\n')
+    with pytest.raises(ValueError, match=r"rotor_axis.value is .*accepted: for each rotor a vector of length 1"):
+        load_vehicle(path)
 
 
 def test_thrust_torque_signs() -> None:
@@ -137,7 +161,7 @@ BROKEN: dict[str, tuple[Callable[[dict], Any], tuple[str, ...]]] = {
     "wrong unit": (lambda t: t["mass"].update(unit="g"), ("mass.unit is 'g'", "accepted: 'kg'")),
     "wrong shape": (lambda t: t["inertia"].update(value=[1e-3, 1e-3]), ("inertia.value", "[0.001, 0.001]", "(3,)")),
     "ragged": (
-        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[[1.0], ", "(4, 2)")
+        lambda t: t["rotor_position"].update(value=[[1.0], [1.0, 2.0]]), ("rotor_position.value", "[[1.0], ", "(N, 2)")
     ),
     "list for a number": (lambda t: t["mass"].update(value=[0.75]), ("mass.value is [0.75]", "a number")),
     "text for a number": (lambda t: t["mass"].update(value="heavy"), ("mass.value is 'heavy'", "a number")),
@@ -233,7 +257,7 @@ def test_a_file_with_a_byte_order_mark(tmp_path: Path) -> None:
 
 
 def test_unknown_name() -> None:
-    with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_[hr]'.*crazyflie, vis_h, vis_r"):
+    with pytest.raises(ValueError, match=r"unknown vehicle 'vis_x'; did you mean 'vis_[hr]'.*octo, vis_h, vis_r"):
         load_vehicle("vis_x")
     with pytest.raises(ValueError, match=r"vehicle file 'nowhere/quad\.toml' does not exist"):
         load_vehicle("nowhere/quad.toml")

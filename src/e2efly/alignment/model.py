@@ -18,7 +18,7 @@ from e2efly.simulation.physics.body import drag, rotor_speed_for, rotor_thrust, 
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
-from e2efly.simulation.physics.state import Parts, State, split4
+from e2efly.simulation.physics.state import Parts, State, split
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 
 
@@ -230,7 +230,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     }
     spun, earlier = window["rotor_speed"], None
     if model.driver in _MOTORS:  # the start speeds were not measured: simulate them from the outputs before the start
-        earlier = _spinning(plant, jnp.stack(_driven_speed(model, split4(before[:, :4]), added), -1))
+        earlier = _spinning(plant, jnp.stack(_driven_speed(model, split(before[:, :4]), added), -1))
         spun = earlier[-1]
     first = State(
         window["position"] + start[:3],
@@ -243,7 +243,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     controller = model.controller(vehicle)
 
     def advance(parts: Parts, drive: Array) -> tuple[Parts, Parts]:
-        drives = split4(drive[:4])
+        drives = split(drive[:4])
         if model.driver == "rotor_speed":
             parts = dataclasses.replace(parts, rotor_speed=drives)
             parts = integrate(plant, parts, drives, None, STEP)
@@ -261,7 +261,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
 
     begin = Parts.of(first)
     if model.driver == "rotor_speed":
-        begin = dataclasses.replace(begin, rotor_speed=split4(acting[0]))
+        begin = dataclasses.replace(begin, rotor_speed=split(acting[0]))
     _, later = jax.lax.scan(advance, begin, acting)
     whole = jax.tree.map(lambda a, b: jnp.concatenate([jnp.asarray(a)[None], b]), begin, later)
     return _sensed(plant, whole, q, earlier if model.driver == "motor" else None)
@@ -339,7 +339,7 @@ def _sensed(plant: Airframe, parts: Parts, q: Array, earlier: Array | None = Non
     collective, _ = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
     felt = collective
     if earlier is not None:
-        before, _ = rotor_wrench(plant, rotor_thrust(plant, split4(earlier)))
+        before, _ = rotor_wrench(plant, rotor_thrust(plant, split(earlier)))
         felt = _filtered(jnp.concatenate([before, collective]), q)[len(earlier) :]
     air = drag(plant, parts.attitude.unrotate(parts.velocity))
     force = Vec3(air.x, air.y, air.z + collective).stack() * plant.specific

@@ -16,7 +16,7 @@ from e2efly.logs.recording import KINDS, Record
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import lagged
-from e2efly.simulation.physics.state import Parts, State, split4
+from e2efly.simulation.physics.state import Parts, State, split
 
 SIGNALS = {
     "roll_rate": "rad/s", "pitch_rate": "rad/s", "yaw_rate": "rad/s", "thrust": "m/s^2", "attitude": "rad",
@@ -104,7 +104,7 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
 
     def wanted(rate: Array, command: Array) -> Any:
         state = State(jnp.zeros(3), jnp.zeros(3), jnp.eye(4)[0], rate, jnp.zeros(4))
-        return law(controller, model.mixer, Parts.of(state), split4(command), None)
+        return law(controller, model.mixer, Parts.of(state), split(command), None)
 
     def follow(speed: Any, seen: tuple[Array, Array]) -> tuple[Any, None]:
         return lagged(speed, wanted(*seen), plant.decay), None

@@ -22,7 +22,7 @@ from e2efly.control.vectors import Vec3
 from e2efly.logs.recording import Record, Stream
 from e2efly.simulation.physics.body import gyroscopic_torque, rotor_speed_for
 from e2efly.simulation.physics.integrate import lagged
-from e2efly.simulation.physics.state import split4
+from e2efly.simulation.physics.state import split
 from e2efly.vehicles.vehicle import allocation_matrix
 
 LONG, PIECES = 1.0, 4
@@ -185,7 +185,7 @@ def _rotors(model: Model, x: Array, window: dict[str, Any]) -> Array:
     error = command[:, 1:] - rates
     summed = vehicle.rate_integral_gain * jnp.cumsum(error, axis=0) * STEP
     held = jnp.mean(window["turning"] - vehicle.rate_gain * error - summed, axis=0)
-    start = split4(window["speed"][0]), first, Vec3.of(command[0, 1:]), Vec3.of(held)
+    start = split(window["speed"][0]), first, Vec3.of(command[0, 1:]), Vec3.of(held)
     _, later = jax.lax.scan(follow, start, (earlier, command, window["rate"][:-1], window["rate"][1:]))
     return jnp.concatenate([window["speed"][:1], later])
 

@@ -9,7 +9,7 @@ import numpy as np
 from e2efly.alignment.estimates import Estimate
 from e2efly.config.storage import write_atomically
 from e2efly.config.tables import read_table
-from e2efly.vehicles.loading import CORRELATION, vehicle_file
+from e2efly.vehicles.loading import CORRELATION, MIXER, vehicle_file
 from e2efly.vehicles.posterior import Entry, read_correlation
 from e2efly.vehicles.vehicle import Vehicle, quantities
 from e2efly.vehicles.vehicle_rules import check
@@ -30,7 +30,8 @@ def merged(base: Vehicle, found: Mapping[str, Estimate]) -> Vehicle:
         if name == "inertia" and known.any():  # otherwise no rigid body might have these three
             new = np.where(known, new, own * np.mean(estimate.value[known] / own[known]))
         values[name] = new if new.shape else float(new)
-    vehicle = Vehicle(**({f.name: getattr(base, f.name) for f in quantities(base)} | {"name": base.name} | values))
+    kept = {f.name: getattr(base, f.name) for f in quantities(base)} | {"name": base.name, "mixer": base.mixer}
+    vehicle = Vehicle(**(kept | values))
     check(vehicle, "identified vehicle")
     return vehicle
 
@@ -54,6 +55,7 @@ def write_vehicle(
         f"# {path.stem}: identified by e2efly, from {base.name}. Every entry: value, unit and source; sigma is the",
         "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
     ]
+    lines += [f"{MIXER} = {_text(vehicle.mixer)}"] if vehicle.mixer else []
     for f in quantities(vehicle):
         entry: dict[str, Any] = table.get(f.name, {"unit": f.metadata["unit"]})  # a term that the base does not have
         lines += ["", f"[{f.name}]", f"value = {_toml(getattr(vehicle, f.name))}", f"unit = {_text(entry['unit'])}"]

@@ -35,7 +35,7 @@ from e2efly.control.vectors import Quat, Vec3
 from e2efly.logs.recording import Record
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import accelerations
-from e2efly.simulation.physics.state import Parts, split4
+from e2efly.simulation.physics.state import Parts, split
 from e2efly.vehicles.gravity import GRAVITY
 
 SHORT = 10
@@ -138,7 +138,7 @@ def _of_window(model: Model, p: Array, q: Array, window: dict[str, Any]) -> dict
     rate, velocity, attitude = (_middle(window[name]) for name in ("body_rate", "velocity", "quaternion"))
     parts = Parts(
         Vec3.of(jnp.zeros_like(rate)), Vec3.of(velocity), Quat.of(turned(attitude, rate * late - tilt)), Vec3.of(rate),
-        split4(window["speed"]),
+        split(window["speed"]),
     )  # fmt: skip
     linear, angular = accelerations(plant, parts, wind_of(q))
     force = parts.attitude.unrotate(Vec3(linear.x, linear.y, linear.z + GRAVITY)).stack()

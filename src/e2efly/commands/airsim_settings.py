@@ -34,10 +34,12 @@ def run(options: AirsimSettings) -> int:
     from e2efly.policy.zoo import policy_file
     from e2efly.validation.airsim.settings_file import named, settings, unsaid
     from e2efly.vehicles.loading import load_vehicle
+    from e2efly.vehicles.vehicle_rules import check_quadrotor
 
     if not 1 <= options.port <= 65535:
         raise ValueError(f"--port is {options.port}; accepted: 1 to 65535")
     vehicle = load_vehicle(options.vehicle)
+    check_quadrotor(vehicle, "AirSim")
     images = ()
     if options.policy is not None:
         images = load_policy(policy_file(options.policy, options.vehicle)).contract.images

@@ -14,6 +14,7 @@ from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.storage import write_json
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 if TYPE_CHECKING:
     from e2efly.alignment.alignment import Alignment
@@ -72,6 +73,7 @@ def run(options: Align) -> int:
     if options.pose_delay is not None and not 0 <= options.pose_delay <= 1:
         raise ValueError(f"--pose-delay is {options.pose_delay}; accepted: 0 to 1 s")
     vehicle, reading = load_vehicle(options.vehicle), options.read.reading()
+    check_quadrotor(vehicle, "align")
     read = with_blackboxes([record for path in options.logs for record in read_flights(path, reading)])
     show_notes(read, console)
     driver_of(read, step=True)

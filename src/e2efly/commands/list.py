@@ -75,8 +75,8 @@ def _presets() -> Rows:
 def _vehicles() -> Rows:
     loaded = [(name, load_vehicle(name)) for name in vehicle_names()]
     return [
-        {"vehicle": name, "mass, kg": f"{v.mass:g}", "thrust/weight": f"{v.thrust_to_weight:.2f}",
-         "latency, s": f"{v.latency:g}", "hash": v.hash}
+        {"vehicle": name, "rotors": str(v.rotor_count), "mass, kg": f"{v.mass:g}",
+         "thrust/weight": f"{v.thrust_to_weight:.2f}", "latency, s": f"{v.latency:g}", "hash": v.hash}
         for name, v in loaded
     ]  # fmt: skip
 

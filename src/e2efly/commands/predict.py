@@ -14,6 +14,7 @@ from e2efly.commands.log_options import LogOptions, read_checked
 from e2efly.commands.terminal import Terminal, headed
 from e2efly.config.storage import make_folder, write_json
 from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 if TYPE_CHECKING:
     from e2efly.alignment.open_loop import Forecast
@@ -63,6 +64,7 @@ def run(options: Predict) -> int:
     if options.volts is not None and not 0 < options.volts < np.inf:
         raise ValueError(f"--volts is {options.volts}; accepted: above 0 V")
     vehicle = load_vehicle(options.vehicle)
+    check_quadrotor(vehicle, "predict")
     believed = load_vehicle(options.believed) if options.believed else None
     given = vehicle.nominal_voltage if options.volts is None else options.volts
     records = read_checked(options.logs, options.read.reading(), vehicle, console)

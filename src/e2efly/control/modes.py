@@ -1,8 +1,9 @@
-"""Command modes: the meaning and limits of the four numbers of a command, and how they become CTBR. Imports no JAX.
+"""Command modes: the meaning and limits of the numbers of a command, and how they become CTBR. Imports no JAX.
 
 A mode is one entry of `COMMAND_MODES`. Simulator, contract, bridge and other plants use only this entry.
 """
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,9 +14,9 @@ from e2efly.control.vectors import Quat, Vec3
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
-Four = tuple[float, float, float, float]
 Limits = tuple[list[float], list[float]]
 ROTORS = ("rear_right", "front_right", "rear_left", "front_left")
+"""Names of a quadrotor's rotors, in their order."""
 THRUST, RATES = "collective_thrust", ("rad/s", "rad/s", "rad/s")
 
 
@@ -24,22 +25,28 @@ class CommandMode:
     """A command mode."""
 
     name: str
-    fields: tuple[str, str, str, str]
-    """Names of the four numbers."""
-    units: tuple[str, str, str, str]
+    fields: tuple[str, ...]
+    """Names of the four numbers. In the modes of rotor thrusts, those of a quadrotor: see `of`."""
+    units: tuple[str, ...]
     """Their units."""
     limits: Callable[[Vehicle, float], Limits]
     """(nominal vehicle, range of positions in m) -> smallest and largest command."""
     controller: Controller | None
     """Controller that makes CTBR of a command. None: the command is the rotor thrusts, below the flight controller's
     rate loop."""
-    hover: Callable[[Vehicle], Four] = lambda vehicle: (0.0, 0.0, 0.0, 0.0)
+    hover: Callable[[Vehicle], tuple[float, ...]] = lambda vehicle: (0.0, 0.0, 0.0, 0.0)
     """The command that makes a level vehicle hover, if the mode has one."""
     fixed: tuple[str, ...] = ("origin_yaw",)
     """Options of a goal that would move the world under the command. They concern the world axes, which no policy
     observes."""
     of_largest: bool = False
     """Whether rotor thrusts are shares of the largest thrust. Otherwise they are in N."""
+
+    def of(self, rotor_count: int) -> "CommandMode":
+        """The mode for vehicles with this number of rotors: only modes of rotor thrusts depend on it."""
+        if self.controller is not None:
+            return self
+        return dataclasses.replace(self, fields=rotor_names(rotor_count), units=self.units[:1] * rotor_count)
 
 
 def ctbr(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
@@ -71,34 +78,40 @@ def position(vehicle: Vehicle, motion: Motion, command: Command) -> Ctbr:
     return reach(vehicle, motion, wanted, command[3])
 
 
+def rotor_names(count: int) -> tuple[str, ...]:
+    """Names of the rotors of a vehicle, in their order."""
+    return ROTORS if count == len(ROTORS) else tuple(f"rotor_{i}" for i in range(count))
+
+
 def _symmetric(*limits: float) -> Limits:
     return [-float(x) for x in limits], [float(x) for x in limits]
 
 
 def _rotors(vehicle: Vehicle, _: float) -> Limits:
     low, high = vehicle.thrust_range
-    return [low] * 4, [high] * 4
+    return [low] * vehicle.rotor_count, [high] * vehicle.rotor_count
 
 
 def _with_thrust(vehicle: Vehicle, *limits: float) -> Limits:
     """Limits of a collective thrust, which is never negative, and of three other numbers."""
     low, high = _symmetric(*limits)
-    return [0.0, *low], [4 * vehicle.thrust_range[1] / vehicle.mass, *high]
+    return [0.0, *low], [vehicle.lift * vehicle.thrust_range[1] / vehicle.mass, *high]
 
 
-def _each(x: float) -> Four:
-    return x, x, x, x
+def _each(vehicle: Vehicle, x: float) -> tuple[float, ...]:
+    return (x,) * vehicle.rotor_count
 
 
 COMMAND_MODES: dict[str, CommandMode] = {
     mode.name: mode
     for mode in (
         CommandMode(
-            "rotor_thrust", ROTORS, ("N", "N", "N", "N"), _rotors, None, hover=lambda v: _each(v.mass * GRAVITY / 4),
+            "rotor_thrust", ROTORS, ("N", "N", "N", "N"), _rotors, None,
+            hover=lambda v: _each(v, v.mass * GRAVITY / v.lift),
         ),
         CommandMode(
-            "rotor_share", ROTORS, ("1", "1", "1", "1"), lambda v, _: ([0.0] * 4, [1.0] * 4), None,
-            hover=lambda v: _each(1 / v.thrust_to_weight), of_largest=True,
+            "rotor_share", ROTORS, ("1", "1", "1", "1"), lambda v, _: (list(_each(v, 0.0)), list(_each(v, 1.0))), None,
+            hover=lambda v: _each(v, 1 / v.thrust_to_weight), of_largest=True,
         ),
         CommandMode(
             "ctbr", (THRUST, "roll_rate", "pitch_rate", "yaw_rate"), ("m/s^2", *RATES),
@@ -127,5 +140,5 @@ COMMAND_MODES: dict[str, CommandMode] = {
 
 
 def command_limits(mode: CommandMode, vehicle: Vehicle, position_range: float = 5.0) -> np.ndarray:
-    """Smallest and largest command, (2, 4), for the nominal (loaded) vehicle."""
+    """Smallest and largest command, (2, 4) or one for each rotor, (2, N), for the nominal (loaded) vehicle."""
     return np.asarray(mode.limits(vehicle, position_range), np.float64)

@@ -1,6 +1,7 @@
 """Effects that a vehicle file does not include: gusts, pushes, uneven and weak rotors, a sagging battery, drift."""
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -30,7 +31,7 @@ class Disturbance:
     """Correlation time of the gusts, s."""
     gust: Float[Array | np.ndarray, "n 3"]
     """Current gust, world, m/s."""
-    rotor_share: Float[Array | np.ndarray, "n 4"]
+    rotor_share: Float[Array | np.ndarray, "n r"]
     """Thrust of each rotor relative to that of the thrust map, with a full battery."""
     sag: Float[Array | np.ndarray, " n"]
     """Share of all thrust that is lost by the end of the episode."""
@@ -38,7 +39,7 @@ class Disturbance:
     """Standard deviation of the poses' drift after one second, m per axis."""
     drift: Float[Array | np.ndarray, "n 3"]
     """Current error of the observed position, world, m."""
-    ceiling: Float[Array | np.ndarray, "n 4"]
+    ceiling: Float[Array | np.ndarray, "n r"]
     """Highest thrust of each rotor relative to that of the thrust map at full speed. 1: no ceiling of its own."""
     push: Float[Array | np.ndarray, "n 2"]
     """Acceleration by a constant horizontal force from outside, world, m/s^2."""
@@ -46,14 +47,12 @@ class Disturbance:
     """1: the mixer clips each rotor by itself. 0: attitude has priority over thrust."""
 
     @staticmethod
-    def none(n: int) -> "Disturbance":
+    def none(n: int, rotors: int = 4) -> "Disturbance":
         """No disturbance."""
-        zero, zeros = jnp.zeros(n), jnp.zeros((n, 3))
-        return Disturbance(
-            zero, jnp.ones(n), zeros, jnp.ones((n, 4)), zero, zero, zeros, jnp.ones((n, 4)), zeros[:, :2], zero
-        )
+        zero, zeros, whole = jnp.zeros(n), jnp.zeros((n, 3)), jnp.ones((n, rotors))
+        return Disturbance(zero, jnp.ones(n), zeros, whole, zero, zero, zeros, whole, zeros[:, :2], zero)
 
-    def share(self, progress: Float[Array, " n"]) -> Float[Array, "n 4"]:
+    def share(self, progress: Float[Array, " n"]) -> Float[Array, "n r"]:
         """Thrust of each rotor relative to that of the thrust map, after this share of the episode."""
         return jnp.asarray(self.rotor_share) * (1 - self.sag * progress)[:, None]
 
@@ -68,13 +67,18 @@ class Disturbance:
         thrust, `thrust_max`, N.
         """
         shares = jnp.moveaxis(jnp.asarray(self.ceiling), -1, 0)
-        speeds = rotor_speed_for(known, tuple(share * thrust_max for share in shares))  # type: ignore[arg-type]
+        speeds = rotor_speed_for(known, tuple(share * thrust_max for share in shares))
         most = jnp.stack([jnp.where(s < 1, w, jnp.inf) for s, w in zip(shares, speeds, strict=True)], axis=-1)
         own = plant.rotor_speed_ceiling
         return replace(plant, rotor_speed_ceiling=most if own is None else jnp.minimum(own, most))
 
 
-def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
+def level(offset: Any, positions: Any) -> Any:
+    """Offsets in the body's x-y plane, (*n, 2), m, with as many components as positions have."""
+    return jnp.pad(offset, [(0, 0)] * (offset.ndim - 1) + [(0, positions.shape[-1] - 2)])
+
+
+def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int, rotors: int = 4) -> Disturbance:
     """The disturbances of n episodes.
 
     Args:
@@ -82,21 +86,22 @@ def draw(config: DisturbanceConfig, key: PRNGKeyArray, n: int) -> Disturbance:
             is of one kind or of the other.
         key: the random key.
         n: the number of episodes.
+        rotors: the number of rotors of each vehicle.
     """
     strength_key, rotor_key, gust_key = jax.random.split(key, 3)
     strength = jax.random.uniform(strength_key, (3, n))
-    unit = uniform(rotor_key, n, 5)
+    unit = uniform(rotor_key, n, rotors + 1)
     gust_speed = config.gust * strength[0]
     pushed, way = jax.random.uniform(jax.random.fold_in(key, 4), (2, n)) * jnp.array([[GRAVITY], [2 * jnp.pi]])
     return Disturbance(
         gust_speed=gust_speed,
         gust_time=jnp.full(n, config.gust_time),
         gust=gust_speed[:, None] * jax.random.normal(gust_key, (n, 3)),
-        rotor_share=(1 + config.rotor * unit[:, :4]) * (1 + config.thrust * unit[:, 4:]),
+        rotor_share=(1 + config.rotor * unit[:, :-1]) * (1 + config.thrust * unit[:, -1:]),
         sag=config.sag * strength[1],
         drift_rate=config.drift * strength[2],
         drift=jnp.zeros((n, 3)),
-        ceiling=1 - config.ceiling * jax.random.uniform(jax.random.fold_in(key, 3), (n, 4)),
+        ceiling=1 - config.ceiling * jax.random.uniform(jax.random.fold_in(key, 3), (n, rotors)),
         push=(config.push * pushed * jnp.stack([jnp.cos(way), jnp.sin(way)])).T,
         plain_mixer=1.0 * (jax.random.uniform(jax.random.fold_in(key, 5), (n,)) < config.plain_mixer),
     )

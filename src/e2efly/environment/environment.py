@@ -100,11 +100,11 @@ class Env:
     task: Task
     weights: dict[str, Any]
     parameters: dict[str, Any]
-    center: Float[Array, "4"]
+    center: Float[Array, " c"]
     """Command at action 0, of the nominal vehicle."""
-    half: Float[Array, "4"]
+    half: Float[Array, " c"]
     """Half of the command's range."""
-    hover: Float[Array, "4"]
+    hover: Float[Array, " c"]
     """The action with which a level vehicle hovers, if the command mode has one. Otherwise the middle of the range."""
     latency_range: Float[Array | np.ndarray, "2"]
     observation_latency_range: Float[Array | np.ndarray, "2"]
@@ -303,7 +303,7 @@ class Env:
         """Whether the time of an episode is over, at a time since its start, s."""
         return time >= self.task.episode_s - 1e-3 * self.control_period
 
-    def command(self, action: Float[Array, "n 4"]) -> Float[Array, "n 4"]:
+    def command(self, action: Float[Array, "n c"]) -> Float[Array, "n c"]:
         """The nominal action map: linear from [-1, 1] to the command's range, and clipped to it."""
         return self.center + self.half * jnp.clip(action, -1.0, 1.0)
 
@@ -322,7 +322,7 @@ class Env:
         return self.look(state, jnp.ones(n, bool)), self._observe(state)
 
     def step(
-        self, state: EnvState, action: Float[Array, "n 4"], *, restart: bool = True, privileged: bool = False
+        self, state: EnvState, action: Float[Array, "n c"], *, restart: bool = True, privileged: bool = False
     ) -> tuple[EnvState, Step]:
         """One control step.
 
@@ -359,6 +359,11 @@ class Env:
         return dataclasses.replace(state, images=newest(self.cameras, scene, state, renewed, self.control_period))
 
     @property
+    def action_size(self) -> int:
+        """Number of entries of an action: four, or one for each rotor in the modes of rotor thrusts."""
+        return len(self.hover)
+
+    @property
     def privileged_size(self) -> int:
         """Number of entries of `privileged`."""
         return 3 + len(LEADS) if self.cameras else 0
@@ -388,7 +393,7 @@ class Env:
         state, observation = jax.lax.cond(jnp.any(out.done), anew, lambda _: (state, out.final_observation), None)
         return state, dataclasses.replace(out, observation=observation)
 
-    def _advance(self, state: EnvState, action: Float[Array, "n 4"]) -> tuple[EnvState, Step]:
+    def _advance(self, state: EnvState, action: Float[Array, "n c"]) -> tuple[EnvState, Step]:
         """One control step without new starts, with the images of the previous step."""
         period = self.control_period
         actions = jnp.concatenate([action[:, None], state.actions[:, :-1]], axis=1)
@@ -473,21 +478,21 @@ class Env:
         plant = known | perturbed(plant_key, n, self.physics.flown, self.randomize, about)
         if self.disturbance is not None:
             disturbed_key, mass_key = jax.random.split(jax.random.fold_in(plant_key, 1))
-            disturbed = disturbance.draw(self.disturbance, disturbed_key, n)
+            disturbed = disturbance.draw(self.disturbance, disturbed_key, n, flown.rotor_count)
             rotors: Any = plant.get("rotor_position", flown.rotor_position)
             offset = self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
             if self.family is not None:  # in proportion to the size
                 offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
-            plant["rotor_position"] = rotors - offset
+            plant["rotor_position"] = rotors - disturbance.level(offset, rotors)
         dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
-        rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, 4))
+        rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, flown.rotor_count))
         vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
         vehicle = jax.tree.map(lambda x: x.astype(dtype), started(self.physics, flown, vehicle))
         past = None
         if self.past:
             past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)
-        actions = jnp.broadcast_to(self.hover, (n, self.queue, 4)).astype(dtype)
+        actions = jnp.broadcast_to(self.hover, (n, self.queue, self.action_size)).astype(dtype)
         estimate_key, link_key = (jax.random.fold_in(observation_key, i) for i in (1, 2))
         return EnvState(
             vehicle=vehicle,
@@ -520,7 +525,7 @@ class Env:
         """Whether a reward term reads one of these signals."""
         return any(signal in rewards.TERMS.find(name).inputs for name in self.weights for signal in signals)
 
-    def expert_action(self, state: EnvState) -> Float[Array, "n 4"]:
+    def expert_action(self, state: EnvState) -> Float[Array, "n c"]:
         """The action of an expert that knows the whole world and this vehicle. It has no gradient.
 
         For tasks that have an `expert`, and for commands of thrust and body rates.
@@ -532,11 +537,15 @@ class Env:
         known = {name: state.plant[name] for name in ("rate_gain", "motor_time_constant") if name in state.plant}
         flown = dataclasses.replace(vehicle, **known)
         progress = state.time / self.task.episode_s
-        share = jnp.ones((len(progress), 4)) if state.disturbance is None else state.disturbance.share(progress)
+        share = (
+            jnp.ones((len(progress), vehicle.rotor_count))
+            if state.disturbance is None
+            else state.disturbance.share(progress)
+        )
         effect = expert.CommandEffect.of(flown, state.plant, share)
         queue = effect.given(self.command(state.actions))
         motion = expert.ahead(flown, state.vehicle, queue, state.action_latency, self.control_period)
-        largest = jnp.minimum((self.center + self.half)[0], 4 * physics.mixer.thrust_max / vehicle.mass)
+        largest = jnp.minimum((self.center + self.half)[0], vehicle.lift * physics.mixer.thrust_max / vehicle.mass)
         pilot = expert.pilot(flown, largest * effect.thrust)
         velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion))
         command = effect.needed(expert.command(pilot, motion, velocity, yaw))

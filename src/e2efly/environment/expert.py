@@ -54,7 +54,7 @@ class CommandEffect:
     rad s/m. Rotors of unequal strength, or around another centre of mass, turn the vehicle."""
 
     @staticmethod
-    def of(vehicle: Vehicle, plant: dict[str, Array], share: Float[Array, "n 4"]) -> "CommandEffect":
+    def of(vehicle: Vehicle, plant: dict[str, Array], share: Float[Array, "n r"]) -> "CommandEffect":
         """The effect for a vehicle with these parameters, whose rotors give these shares of their thrust.
 
         A rate loop without an integral part comes to rest where its torque, J K times the rate error, is against that
@@ -62,8 +62,9 @@ class CommandEffect:
         """
         mass, mean = plant.get("mass", vehicle.mass) / vehicle.mass, jnp.mean(share, axis=-1)
         arm = jnp.asarray(vehicle.rotor_position)
-        uneven = plant.get("rotor_position", arm) * share[..., None] - arm
-        torque = jnp.asarray(vehicle.mass)[..., None] / 4 * jnp.sum(uneven, axis=-2)[..., ::-1] * jnp.array([1.0, -1.0])
+        uneven = (plant.get("rotor_position", arm) * share[..., None] - arm)[..., :2]
+        each = jnp.asarray(vehicle.mass / vehicle.lift)[..., None]
+        torque = each * jnp.sum(uneven, axis=-2)[..., ::-1] * jnp.array([1.0, -1.0])
         offset = torque / (vehicle.inertia * vehicle.rate_gain)[..., :2] / mean[:, None]
         if vehicle.rate_integral_gain is not None:
             offset = 0.0 * offset

@@ -20,7 +20,7 @@ MOST = 10.0
 
 
 def limits_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> np.ndarray:
-    """Smallest and largest command, (2, 4). If the configuration gives none, those of its vehicle, or of all vehicles
+    """Smallest and largest command, (2, c). If the configuration gives none, those of its vehicle, or of all vehicles
     of its family together.
 
     Raises:

@@ -170,9 +170,11 @@ class Draw:
             plant[name] = value * factors[name].reshape(n, *[1] * value.ndim)
         angle, side = rng.uniform(-math.pi, math.pi, (2, n))
         direction = np.stack([np.cos(side), np.sin(side)], axis=1)
-        plant["rotor_position"] = vehicle.rotor_position - (strength("centre_of_mass")[:, None] * direction)[:, None]
-        share = np.ones((n, 4))
-        share[np.arange(n), rng.integers(0, 4, n)] -= strength("rotor")
+        offset = np.zeros((n, 1, vehicle.rotor_position.shape[-1]))
+        offset[:, 0, :2] = strength("centre_of_mass")[:, None] * direction
+        plant["rotor_position"] = vehicle.rotor_position - offset
+        share = np.ones((n, vehicle.rotor_count))
+        share[np.arange(n), rng.integers(0, vehicle.rotor_count, n)] -= strength("rotor")
         gust = strength("gust")
         zero = np.zeros(n)
         heard = {f.name: max(getattr(r.noise, f.name) for r in rows) for f in dataclasses.fields(NoiseConfig)}
@@ -193,7 +195,7 @@ class Draw:
                 sag=strength("sag"),
                 drift_rate=strength("drift"),
                 drift=np.zeros((n, 3)),
-                ceiling=np.ones((n, 4)),
+                ceiling=np.ones_like(share),
                 push=np.zeros((n, 2)),
                 plain_mixer=zero + row.plain_mixer,
             ),

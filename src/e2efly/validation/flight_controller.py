@@ -6,11 +6,10 @@ On plain numbers it is four times as fast as on arrays of three. This matters at
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from e2efly.control import COMMAND_MODES, Quat, Vec3
+from e2efly.control.allocation import Allocation, ThrustLimits, nearest, shifted
 from e2efly.validation.plant import PlantMotion
-from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, inertia_tensor
+from e2efly.vehicles.vehicle import MixerRule, Vehicle, inertia_tensor
 
 Numbers = Sequence[float]
 
@@ -57,10 +56,8 @@ class FlightController:
 class PlainRateLoop:
     """The rate loop and the mixer, from collective thrust over mass, m/s^2, and body rates, rad/s, to rotor thrusts.
 
-    torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w. The mixer gives attitude priority
-    over thrust. If the torque needs a larger span than a rotor has, the whole torque is scaled down. Then the
-    collective thrust is shifted until every rotor is inside its limits. A plain mixer clips each rotor by itself
-    instead.
+    torque = J (K (wanted - w) + integral) + w x J w at the filtered body rates w. The mixer follows the rule of the
+    vehicle file (`e2efly.control.allocation`). A plain mixer clips each rotor by itself instead.
     """
 
     def __init__(self, vehicle: Vehicle, plain_mixer: bool = False) -> None:
@@ -68,8 +65,11 @@ class PlainRateLoop:
         (jx, xy, xz), (_, jy, yz), (*_, jz) = inertia_tensor(vehicle).tolist()
         self._inertia = jx, jy, jz, xy, xz, yz
         self._gains, self._limits = vehicle.rate_gain.tolist(), vehicle.body_rate_max.tolist()
-        self._rows = np.linalg.inv(allocation_matrix(vehicle)).tolist()
-        self._range = vehicle.thrust_range
+        found = Allocation.of(vehicle)
+        self._rule: MixerRule = found.rule
+        self._rows = found.matrix.tolist()
+        self._descent, self._pull = ([] if x is None else x.tolist() for x in (found.descent, found.pull))
+        self._thrust_limits = ThrustLimits(*vehicle.thrust_range, larger=max, smaller=min)
         gain, time = vehicle.rate_integral_gain, vehicle.gyro_time_constant
         self._integral_gains = None if gain is None else gain.tolist()
         self._largest = [k * rate for k, rate in zip(self._gains, self._limits, strict=True)]
@@ -114,14 +114,11 @@ class PlainRateLoop:
         )
 
     def _mixed(self, collective: float, torque: tuple[float, float, float]) -> list[float]:
-        (x, y, z), (low, high) = torque, self._range
-        spread = [row[1] * x + row[2] * y + row[3] * z for row in self._rows]
-        if self._plain:
-            return [min(max(row[0] * collective + s, low), high) for row, s in zip(self._rows, spread, strict=True)]
-        scale = (high - low) / max(max(spread) - min(spread), high - low)
-        asked = [row[0] * collective + scale * s for row, s in zip(self._rows, spread, strict=True)]
-        shift = max(low - min(asked), 0.0) - max(max(asked) - high, 0.0)
-        return [min(max(f + shift, low), high) for f in asked]
+        plain, limits = 1.0 if self._plain else None, self._thrust_limits
+        wrench = collective, *torque
+        if self._descent:
+            return list(nearest((self._rows, self._descent, self._pull), wrench, limits, plain))
+        return list(shifted(self._rule, self._rows, wrench, limits, plain))
 
 
 def rotor_speed_of(thrust_map: Numbers, thrusts: Numbers) -> list[float]:

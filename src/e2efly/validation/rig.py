@@ -27,6 +27,7 @@ from e2efly.validation.sitl import FirmwareState, Sitl
 from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 STEP_S = 0.002
 """Interval at which the firmware's sensors get a new state, s."""
@@ -130,6 +131,7 @@ class Rig:
         settings: tuple[str, ...] = (),
         pose_noise: tuple[float, ...] = POSE_NOISE,
     ) -> None:
+        check_quadrotor(vehicle, "the rig of the Betaflight firmware")
         compute_at_once()
         self._step = step
         self._settings = (*vehicle_lines(vehicle, firmware.release), *SETTINGS, *settings)

@@ -18,6 +18,7 @@ from jax import Array
 from e2efly.config import CameraConfig
 from e2efly.config.names import unknown
 from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.disturbance import level
 from e2efly.environment.episodes import Act, Episodes, EpisodesUnderWay, run_stepwise, summary
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import fast_compile, prepare, wide_vectors
@@ -210,7 +211,7 @@ def _programs(seeing: bool, size: int) -> tuple[Callable, Callable]:
         wind, share = air_of(now, state.vehicle)
         plant: dict[str, Any] = {**draw.plant, **{name: getattr(now, name) for name in BODY}}
         plant["mass"] = plant["mass"] * now.mass
-        plant["rotor_position"] = plant["rotor_position"] - now.shift[:, None]
+        plant["rotor_position"] = plant["rotor_position"] - level(now.shift[:, None], plant["rotor_position"])
         ceiling = jnp.broadcast_to(now.ceiling[:, None], share.shape)
         disturbance = dataclasses.replace(draw.disturbance, rotor_share=share, ceiling=ceiling)
         latency = draw.latency + now.later

@@ -85,8 +85,8 @@ class LawSetting:
         return 1.0 * (self.progress >= self.rng.uniform(0.1, 0.5, self.n))
 
     def one_rotor(self) -> np.ndarray:
-        """(n, 4) 1 for a random rotor, 0 for the others."""
-        return np.eye(4)[self.rng.integers(0, 4, self.n)]
+        """(n, r) 1 for a random rotor, 0 for the others."""
+        return np.eye(self.vehicle.rotor_count)[self.rng.integers(0, self.vehicle.rotor_count, self.n)]
 
 
 def bursts(s: LawSetting, share: float, mean: float) -> np.ndarray:
@@ -411,8 +411,8 @@ LAWS: dict[str, StressLaw] = {
 """The rows by name. The position of a row determines what it draws, so new rows are added at the end."""
 
 
-WIDTHS = {"lag": 4, "error": 12, "grain": 4, "wind": 3, "shift": 2, "share": 4, "thrust_map": 3}
-"""Number of values of the entries of `LawStep` that are vectors."""
+WIDTHS = {"lag": 4, "error": 12, "grain": 4, "wind": 3, "shift": 2, "thrust_map": 3}
+"""Number of values of the entries of `LawStep` that are vectors, besides `share`, which has one for each rotor."""
 
 
 def steps_of(law: StressLaw | None, setting: LawSetting) -> LawStep:
@@ -429,5 +429,6 @@ def steps_of(law: StressLaw | None, setting: LawSetting) -> LawStep:
     }
     entries |= {} if law is None else law.entries(setting)
     shape = setting.steps, setting.n
-    sizes = {name: (*shape, WIDTHS[name]) if name in WIDTHS else shape for name in entries}
+    widths = WIDTHS | {"share": vehicle.rotor_count}
+    sizes = {name: (*shape, widths[name]) if name in widths else shape for name in entries}
     return LawStep(**{name: np.broadcast_to(x, sizes[name]) for name, x in entries.items()})

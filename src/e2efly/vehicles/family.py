@@ -283,7 +283,8 @@ def _log(xp: Any, u: Any, bounds: Range) -> Any:
 def _loaded(vehicle: Vehicle, name: str) -> Vehicle:
     """A vehicle without leading axes, as if read from a file: plain numbers in place of arrays without axes."""
     values = {f.name: getattr(vehicle, f.name) for f in quantities(vehicle)}
-    return Vehicle(name=name, **{key: value if np.ndim(value) else float(value) for key, value in values.items()})
+    plain: dict[str, Any] = {key: value if np.ndim(value) else float(value) for key, value in values.items()}
+    return Vehicle(name=name, **plain)
 
 
 def family_names() -> list[str]:

@@ -3,13 +3,13 @@
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from e2efly.config.names import nearest, unknown
 from e2efly.config.tables import read_table, shown
-from e2efly.vehicles.vehicle import Vehicle, quantities, terms
+from e2efly.vehicles.vehicle import ROTOR_COUNTS, MixerRule, Vehicle, has_shape, quantities, terms
 from e2efly.vehicles.vehicle_rules import check
 
 _LARGEST = 1e6
@@ -30,6 +30,10 @@ OF_FAMILIES = "thrust_to_weight"
 CORRELATION = "correlation"
 """The table of a vehicle file that describes no single value. It holds the correlations between the errors of the
 values (`e2efly.vehicles.posterior`)."""
+
+
+MIXER = "mixer"
+"""The key of a vehicle file that is no quantity: the rule of the flight controller's mixer, a text."""
 
 
 def vehicle_names() -> list[str]:
@@ -69,7 +73,8 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
             f"{', '.join(vehicle_names())}, or the path of a .toml file"
         )
     table.pop(CORRELATION, None)
-    vehicle = Vehicle(name=path.stem, **read_values(table, (*quantities(), *terms()), where))
+    mixer = _read_mixer(where, table.pop(MIXER, ""))
+    vehicle = Vehicle(name=path.stem, mixer=mixer, **read_values(table, (*quantities(), *terms()), where))
     check(vehicle, where)
     return vehicle
 
@@ -111,11 +116,10 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
     except ValueError:
         value = np.asarray("ragged")
     numbers = value.dtype.kind in "fi" and not any(isinstance(x, bool) for x in np.asarray(given, object).flat)
-    if not numbers or value.shape != shape:
-        expected = "a number" if shape == () else f"numbers of shape {shape}"
-        raise ValueError(f"{where}: {key}.value is {shown(given)}; accepted: {expected}")
+    if not numbers or not has_shape(f, value.shape):
+        raise ValueError(f"{where}: {key}.value is {shown(given)}; accepted: {_expected(f)}")
     value = value.astype(np.float64)
-    _read_sigma(where, f, entry)
+    _read_sigma(where, f, entry, value.shape)
     at_least, above = f.metadata["at_least"], f.metadata["above"]
     accepted = f">= {at_least:g}" if at_least is not None else f"> {above:g}" if above is not None else "finite"
     good = np.abs(value) <= _LARGEST  # false for NaN
@@ -130,9 +134,24 @@ def _read(where: str, f: dataclasses.Field, entry: Any) -> Any:
     return value if shape else float(value)
 
 
-def _read_sigma(where: str, f: dataclasses.Field, entry: dict[str, Any]) -> np.ndarray:
+def _expected(f: dataclasses.Field) -> str:
+    """The shapes that are accepted for a field, in words."""
+    if (components := f.metadata.get("per_rotor")) is None:
+        return "a number" if f.metadata["shape"] == () else f"numbers of shape {f.metadata['shape']}"
+    shapes = " or ".join(f"(N, {size})" for size in components) or "(N,)"
+    return f"numbers of shape {shapes}, with {ROTOR_COUNTS[0]} to {ROTOR_COUNTS[-1]} rotors N"
+
+
+def _read_mixer(where: str, given: Any) -> str:
+    if given and given not in get_args(MixerRule):
+        accepted = ", ".join(map(repr, get_args(MixerRule)))
+        raise ValueError(f"{where}: {MIXER} is {shown(given)}; accepted: {accepted}, or no such key")
+    return given
+
+
+def _read_sigma(where: str, f: dataclasses.Field, entry: dict[str, Any], shape: tuple[int, ...]) -> np.ndarray:
     """Standard deviations of an entry of the file, in the shape of the value. NaN where they are not known."""
-    shape, given = f.metadata["shape"], entry.get("sigma")
+    given = entry.get("sigma")
     if given is None:
         return np.full(shape, np.nan)
     try:
@@ -159,4 +178,5 @@ def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
 
 def sigmas_of(vehicle: Vehicle, table: dict[str, Any], where: str) -> dict[str, np.ndarray]:
     """The same as `read_sigmas`, for a file that was already read."""
-    return {f.name: _read_sigma(where, f, table[f.name]) for f in quantities(vehicle)}
+    fields = quantities(vehicle)
+    return {f.name: _read_sigma(where, f, table[f.name], np.shape(getattr(vehicle, f.name))) for f in fields}

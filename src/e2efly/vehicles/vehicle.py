@@ -1,13 +1,14 @@
 """The vehicle: one frozen dataclass, read from a TOML file in which every value has a unit and a source.
 
-Rotor order is Betaflight's: rear right, front right, rear left, front left. Body frame FLU.
+Rotor order of a quadrotor is Betaflight's: rear right, front right, rear left, front left. With another number of
+rotors, it is the order of the vehicle file. Body frame FLU.
 """
 
 import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -15,6 +16,12 @@ from e2efly.vehicles.gravity import GRAVITY
 
 Controller = Literal["policy", "plant"]
 """The vehicle for which the flight controller is tuned: the policy's own vehicle, or the vehicle that flies."""
+MixerRule = Literal["shift", "betaflight", "qp"]
+"""What a mixer does when a rotor would leave its limits. `shift`: scale down the torque, then shift the thrusts in the
+proportions of pure thrust. `betaflight`: the same with one shift for all rotors, which is pure thrust only if the
+centre of mass is in the middle. `qp`: the nearest wrench by weighted least squares."""
+ROTOR_COUNTS = range(4, 17)
+"""Accepted numbers of rotors. Fewer than four do not give independent thrust, roll, pitch and yaw."""
 
 
 def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
@@ -22,14 +29,27 @@ def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = N
     return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
 
 
-def _term(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
+def _per_rotor(unit: str, components: tuple[int, ...] = ()) -> Any:
+    """A value for each rotor: one number, or as many as one of `components`. Its `shape` is that of a quadrotor."""
+    metadata = _quantity(unit, (4, *components[:1])).metadata
+    return field(metadata={**metadata, "per_rotor": components})
+
+
+def _term(
+    unit: str,
+    shape: tuple[int, ...] = (),
+    at_least: float | None = None,
+    above: float | None = None,
+    per_rotor: tuple[int, ...] | None = None,
+) -> Any:
     """A value that a vehicle file may leave out. The physics then does not have the effect that it describes."""
-    return field(default=None, metadata=_quantity(unit, shape, at_least, above).metadata)
+    metadata = _quantity(unit, shape, at_least, above).metadata
+    return field(default=None, metadata=metadata if per_rotor is None else {**metadata, "per_rotor": per_rotor})
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Physical parameters of a quadrotor, float64 as loaded.
+    """Physical parameters of a multirotor with N rotors, float64 as loaded.
 
     In a simulation any field may have leading batch axes (one value per vehicle): mass `(*n,)`, inertia `(*n, 3)`.
     """
@@ -40,10 +60,10 @@ class Vehicle:
     """Mass."""
     inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
     """Moments of inertia about the body axes. They are the whole inertia tensor if `inertia_products` is left out."""
-    rotor_position: Any = _quantity("m", (4, 2))
-    """Rotor positions in the body's x-y plane."""
-    rotor_spin: Any = _quantity("1", (4,))
-    """Sign of each rotor's reaction torque about body z."""
+    rotor_position: Any = _per_rotor("m", (2, 3))
+    """Rotor positions in the body's x-y plane, (N, 2), or in space, (N, 3). Without a height they are in that plane."""
+    rotor_spin: Any = _per_rotor("1")
+    """Sign of each rotor's reaction torque about its axis, (N,)."""
     thrust_map: Any = _quantity("N*s^2/rad^2, N*s/rad, N", (3,))
     """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero. Order: [k2, k1, k0]."""
     torque_ratio: Any = _quantity("m", at_least=0.0)
@@ -108,8 +128,28 @@ class Vehicle:
     """Voltage that the battery loses under load, divided by the thrust of all rotors. If left out: no loss."""
     speed_per_volt: Any = _term("1", at_least=0.0)
     """Relative change of rotor speed divided by relative change of voltage, at a given command. If left out: 1."""
-    rotor_speed_ceiling: Any = _term("rad/s", (4,), above=0.0)
-    """Highest speed that each rotor really reaches, whatever the command. The flight controller does not know it."""
+    rotor_speed_ceiling: Any = _term("rad/s", (4,), above=0.0, per_rotor=())
+    """Highest speed that each rotor really reaches, whatever the command, (N,). The flight controller does not know
+    it."""
+    rotor_axis: Any = _term("1", (4, 3), per_rotor=(3,))
+    """Unit vector along which each rotor pushes, (N, 3). If left out, all push along body z."""
+    mixer: str = field(default="", metadata={"static": True})
+    """A `MixerRule`. Empty: `shift` with four rotors, `qp` with more."""
+
+    @property
+    def rotor_count(self) -> int:
+        """Number of rotors, N."""
+        return int(np.shape(self.rotor_spin)[-1])
+
+    @property
+    def mixer_rule(self) -> MixerRule:
+        """The rule of the flight controller's mixer."""
+        return cast(MixerRule, self.mixer) if self.mixer else _usual_mixer(self.rotor_count)
+
+    @property
+    def lift(self) -> Any:
+        """Thrust along body z of rotors that each push by one newton, N. Level rotors: their number."""
+        return self.rotor_count if self.rotor_axis is None else self.rotor_axis[..., 2].sum(-1)
 
     @property
     def hash(self) -> str:
@@ -117,7 +157,9 @@ class Vehicle:
 
         Two vehicles fly alike if and only if their hashes are equal.
         """
-        values = {f.name: np.asarray(getattr(self, f.name), np.float64).tolist() for f in quantities(self)}
+        values: dict[str, Any] = {f.name: np.asarray(getattr(self, f.name), float).tolist() for f in quantities(self)}
+        if self.mixer_rule != _usual_mixer(self.rotor_count):
+            values["mixer"] = self.mixer_rule
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def under(self, other: "Vehicle", *names: str) -> "Vehicle":
@@ -135,7 +177,7 @@ class Vehicle:
     @property
     def thrust_to_weight(self) -> float:
         """Largest collective thrust divided by weight."""
-        return float(4 * self.thrust_range[1] / (self.mass * GRAVITY))
+        return float(self.lift * self.thrust_range[1] / (self.mass * GRAVITY))
 
     @property
     def full_rotor_speed(self) -> float:
@@ -146,9 +188,9 @@ class Vehicle:
 
     @property
     def hover_rotor_speed(self) -> float:
-        """Rotor speed at which four equal rotors carry the weight, rad/s."""
+        """Rotor speed at which equal rotors carry the weight, rad/s."""
         k2, k1, k0 = self.thrust_map
-        return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (self.mass * GRAVITY / 4 - k0))) / (2 * k2))
+        return float((-k1 + np.sqrt(k1**2 + 4 * k2 * (self.mass * GRAVITY / self.lift - k0))) / (2 * k2))
 
     def rotor_thrust(self, speed: float) -> float:
         """Thrust of one rotor, N, at a rotor speed, rad/s."""
@@ -188,10 +230,16 @@ class Flown:
                 `plant`: it is tuned to the vehicle that flies.
 
         Raises:
-            ValueError: for another controller.
+            ValueError: for another controller, and for a flight controller of a vehicle with another number of rotors.
         """
         if controller not in get_args(Controller):
             raise ValueError(f"--controller is {controller!r}; accepted: {' or '.join(get_args(Controller))}")
+        if controller == "policy" and own.rotor_count != flown.rotor_count:
+            raise ValueError(
+                f"--controller is 'policy', and vehicle {flown.name!r} has {flown.rotor_count} rotors where the "
+                f"flight controller of {own.name!r} drives {own.rotor_count}; accepted: 'plant', or a vehicle with "
+                f"{own.rotor_count} rotors"
+            )
         if controller == "policy":
             return Flown(flown.under(own), own)
         tuned = flown.under(own, *TIMED)
@@ -212,6 +260,15 @@ def quantities(vehicle: Vehicle | None = None) -> tuple[dataclasses.Field, ...]:
     )
 
 
+def has_shape(f: dataclasses.Field, shape: tuple[int, ...]) -> bool:
+    """Whether a value of this shape is one of this field, for any number of rotors."""
+    if (components := f.metadata.get("per_rotor")) is None:
+        return shape == f.metadata["shape"]
+    if not shape or shape[0] not in ROTOR_COUNTS:
+        return False
+    return shape[1:] in [(size,) for size in components] if components else len(shape) == 1
+
+
 def terms() -> tuple[dataclasses.Field, ...]:
     """The fields that a vehicle file may leave out.
 
@@ -221,9 +278,22 @@ def terms() -> tuple[dataclasses.Field, ...]:
 
 
 def rotor_arms(vehicle: Vehicle) -> np.ndarray:
-    """Positions of the rotors relative to the centre of mass, in the body's x-y plane, (4, 2), m."""
-    arms = np.asarray(vehicle.rotor_position, np.float64)
-    return arms if vehicle.centre_of_mass is None else arms - np.asarray(vehicle.centre_of_mass)[:2]
+    """Positions of the rotors relative to the centre of mass, in the body's x-y plane, (N, 2), m."""
+    return rotor_places(vehicle)[:, :2]
+
+
+def rotor_places(vehicle: Vehicle) -> np.ndarray:
+    """Positions of the rotors relative to the centre of mass, body axes, (N, 3), m."""
+    given = np.asarray(vehicle.rotor_position, np.float64)
+    places = np.pad(given, ((0, 0), (0, 3 - given.shape[1])))
+    return places if vehicle.centre_of_mass is None else places - np.asarray(vehicle.centre_of_mass)
+
+
+def rotor_axes(vehicle: Vehicle) -> np.ndarray:
+    """Directions in which the rotors push, body axes, (N, 3)."""
+    if vehicle.rotor_axis is None:
+        return np.tile([0.0, 0.0, 1.0], (vehicle.rotor_count, 1))
+    return np.asarray(vehicle.rotor_axis, np.float64)
 
 
 def inertia_tensor(vehicle: Vehicle) -> np.ndarray:
@@ -242,9 +312,22 @@ def principal_moments(vehicle: Vehicle) -> np.ndarray:
 
 
 def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
-    """The 4x4 matrix from rotor thrusts, N, to [collective thrust, N; torque about body x, y, z, N*m].
+    """The 4xN matrix from rotor thrusts, N, to [thrust along body z, N; torque about body x, y, z, N*m].
 
     Torques are about the centre of mass.
     """
-    x, y = rotor_arms(vehicle).T
-    return np.stack([np.ones(4), y, -x, np.asarray(vehicle.rotor_spin) * vehicle.torque_ratio])
+    return wrench_matrix(vehicle)[2:]
+
+
+def wrench_matrix(vehicle: Vehicle) -> np.ndarray:
+    """The 6xN matrix from rotor thrusts, N, to [force along body x, y, z, N; torque about body x, y, z, N*m].
+
+    Torques are about the centre of mass.
+    """
+    axes = rotor_axes(vehicle)
+    reaction = (np.asarray(vehicle.rotor_spin) * vehicle.torque_ratio)[:, None] * axes
+    return np.concatenate([axes, np.cross(rotor_places(vehicle), axes) + reaction], axis=1).T
+
+
+def _usual_mixer(rotor_count: int) -> MixerRule:
+    return "shift" if rotor_count == 4 else "qp"

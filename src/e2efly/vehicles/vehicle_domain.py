@@ -50,8 +50,9 @@ def vehicle_domain(vehicle: Vehicle, mode: str) -> Domain:
     found = []
     for name in names:
         if name in fields and name != "centre_of_mass":
-            value, unit = np.atleast_1d(np.asarray(getattr(vehicle, name), float)), fields[name].metadata["unit"]
-            axes = [""] if len(value) == 1 else [f"_{axis}" for axis in ("xyz" if len(value) == 3 else "0123")]
+            value, unit = np.asarray(getattr(vehicle, name), float), fields[name].metadata["unit"]
+            names_of = "xyz" if value.shape == (3,) else range(value.size)
+            axes, value = [f"_{axis}" for axis in names_of] if value.ndim else [""], value.ravel()
             found += [Extent(f"{name}{axis}", unit, x, x) for axis, x in zip(axes, map(float, value), strict=False)]
     height = 0.0 if vehicle.centre_of_mass is None else float(vehicle.centre_of_mass[2])
     arms = np.abs(rotor_arms(vehicle))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from e2efly.vehicles.gravity import GRAVITY
-from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, principal_moments
+from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, principal_moments, quantities
 
 BATTERY = ("nominal_voltage", "battery_voltage", "voltage_sag", "speed_per_volt")
 """The entries of the battery. The first two must be given together, and the others require them."""
@@ -19,24 +19,38 @@ def reached_share(vehicle: Vehicle) -> float:
     """Largest steady thrust with the vehicle's battery, if each rotor had the lowest ceiling, divided by that without
     both.
     """
-    full, most = vehicle.full_rotor_speed, 4 * vehicle.thrust_range[1]
+    full, rotors = vehicle.full_rotor_speed, vehicle.rotor_count
+    most = rotors * vehicle.thrust_range[1]
     ceiling = np.inf if vehicle.rotor_speed_ceiling is None else float(np.min(vehicle.rotor_speed_ceiling))
     if vehicle.battery_voltage is None:
-        return 4 * vehicle.rotor_thrust(min(full, ceiling)) / most
+        return rotors * vehicle.rotor_thrust(min(full, ceiling)) / most
     sag = 0.0 if vehicle.voltage_sag is None else vehicle.voltage_sag
     exponent = 1.0 if vehicle.speed_per_volt is None else vehicle.speed_per_volt
     low, high = 0.0, 1e6
     for _ in range(100):  # more thrust lowers the voltage, and a lower voltage gives less thrust
         middle = (low + high) / 2
         volts = max((vehicle.battery_voltage - sag * middle) / vehicle.nominal_voltage, LEAST_VOLTAGE)
-        gives = 4 * vehicle.rotor_thrust(min(full * volts**exponent, ceiling))
+        gives = rotors * vehicle.rotor_thrust(min(full * volts**exponent, ceiling))
         low, high = (middle, high) if gives > middle else (low, middle)
     return low / most
 
 
+def check_quadrotor(vehicle: Vehicle, what: str) -> None:
+    """Refuse what is not a quadrotor with level rotors, for a part of the program that knows no other.
+
+    Raises:
+        ValueError: naming the vehicle, its rotors, the part and what it accepts.
+    """
+    tilted = "" if vehicle.rotor_axis is None else " tilted"
+    if vehicle.rotor_count != 4 or tilted:
+        raise ValueError(
+            f"vehicle {vehicle.name!r} has {vehicle.rotor_count}{tilted} rotors; accepted by {what}: four level rotors"
+        )
+
+
 def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: str) -> None:
     """Check the optional terms of the physics that a vehicle has. The allocation is the matrix from rotor thrusts to
-    collective thrust and torques, (4, 4), and the weight in N. `where` names the vehicle's file in the error text.
+    collective thrust and torques, (4, N), and the weight in N. `where` names the vehicle's file in the error text.
 
     Raises:
         ValueError: naming the entry, its value and what is accepted.
@@ -58,15 +72,15 @@ def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: 
             f"{vehicle.nominal_voltage} V, voltage_sag.value {vehicle.voltage_sag} V/N: it cannot hover (thrust to "
             f"weight {reached:.2f} with this battery; accepted: more than 1.05)"
         )
-    if vehicle.centre_of_mass is not None:
-        low, high = vehicle.thrust_range
-        hover = np.linalg.solve(allocation, [weight, 0.0, 0.0, 0.0])
-        if hover.min() <= low or hover.max() >= high:
-            raise ValueError(
-                f"{where}: centre_of_mass.value is {vehicle.centre_of_mass.tolist()}: to hover level the rotors would "
-                f"have to push {', '.join(f'{f:.3g}' for f in hover)} N; accepted: a place over which each pushes "
-                f"between {low:.3g} and {high:.3g} N"
-            )
+    low, high = vehicle.thrust_range
+    hover = np.linalg.pinv(allocation) @ [weight, 0.0, 0.0, 0.0]
+    if hover.min() <= low or hover.max() >= high:
+        name = "rotor_position" if vehicle.centre_of_mass is None else "centre_of_mass"
+        raise ValueError(
+            f"{where}: {name}.value is {np.asarray(getattr(vehicle, name)).tolist()}: to hover level the rotors would "
+            f"have to push {', '.join(f'{f:.3g}' for f in hover)} N; accepted: a place over which each pushes "
+            f"between {low:.3g} and {high:.3g} N"
+        )
 
 
 def check(vehicle: Vehicle, where: str = "vehicle") -> None:
@@ -87,10 +101,7 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             f"{where}: inertia.value is {np.asarray(vehicle.inertia).tolist()}{products}; accepted: no principal "
             "moment larger than the sum of the other two (the triangle inequality of every rigid body)"
         )
-    if sorted(vehicle.rotor_spin) != [-1, -1, 1, 1]:
-        raise ValueError(
-            f"{where}: rotor_spin.value is {vehicle.rotor_spin.tolist()}; accepted: two of +1 and two of -1"
-        )
+    _check_rotors(vehicle, where)
     if vehicle.tilt_max >= np.pi / 2:
         raise ValueError(f"{where}: tilt_max.value is {vehicle.tilt_max}; accepted: below pi/2 rad")
     thrust_map = np.asarray(vehicle.thrust_map, np.float64).tolist()
@@ -108,7 +119,7 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             f"{math.floor(10 * max(least, 0.0) + 1) / 10:g} rad/s or more (in tenths), where the thrust by thrust_map "
             f"{thrust_map} is positive and rising"
         )
-    if vehicle.thrust_to_weight <= 1.05 or 4 * vehicle.thrust_range[0] >= vehicle.mass * GRAVITY:
+    if vehicle.thrust_to_weight <= 1.05 or vehicle.lift * vehicle.thrust_range[0] >= vehicle.mass * GRAVITY:
         low, high = vehicle.thrust_range
         raise ValueError(
             f"{where}: mass.value is {vehicle.mass} kg and one rotor gives {low:.4g} to {high:.4g} N by thrust_map, "
@@ -124,6 +135,31 @@ def check(vehicle: Vehicle, where: str = "vehicle") -> None:
             "thrust, roll, pitch and yaw"
         )
     check_terms(vehicle, allocation, vehicle.mass * GRAVITY, where)
+
+
+def _check_rotors(vehicle: Vehicle, where: str) -> None:
+    """Check that all values of single rotors are of the same rotors, that each turns, and pushes upwards."""
+    count = vehicle.rotor_count
+    for f in quantities(vehicle):
+        given = np.shape(getattr(vehicle, f.name))
+        if "per_rotor" in f.metadata and given[0] != count:
+            raise ValueError(
+                f"{where}: {f.name}.value has {given[0]} rotors, and rotor_spin.value {count}; accepted: {count}, one "
+                "entry for each rotor"
+            )
+    spin = vehicle.rotor_spin.tolist()
+    if count == 4 and sorted(spin) != [-1, -1, 1, 1]:
+        raise ValueError(f"{where}: rotor_spin.value is {spin}; accepted: two of +1 and two of -1")
+    if set(spin) != {-1, 1}:
+        raise ValueError(f"{where}: rotor_spin.value is {spin}; accepted: +1 or -1 for each rotor, and both of them")
+    if vehicle.rotor_axis is None:
+        return
+    axes = np.asarray(vehicle.rotor_axis)
+    if np.any(np.abs(np.linalg.norm(axes, axis=1) - 1) > 1e-3) or np.any(axes[:, 2] <= 0):
+        raise ValueError(
+            f"{where}: rotor_axis.value is {axes.tolist()}; accepted: for each rotor a vector of length 1 (within "
+            "0.001) whose part along body z is above 0"
+        )
 
 
 def _slowest(k2: float, k1: float, k0: float) -> float:

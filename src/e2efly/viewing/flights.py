@@ -25,9 +25,9 @@ class Flights:
     """Unit quaternion wxyz, body to world."""
     body_rate: Float[np.ndarray, "t n 3"]
     """Body, rad/s."""
-    rotor_speed: Float[np.ndarray, "t n 4"]
-    """Rear right, front right, rear left, front left, rad/s."""
-    command: Float[np.ndarray, "t n 4"]
+    rotor_speed: Float[np.ndarray, "t n r"]
+    """In the order of the vehicle file, of a quadrotor rear right, front right, rear left, front left; rad/s."""
+    command: Float[np.ndarray, "t n c"]
     """Command of the policy at the start of the step, in the units of the command mode. It acts one latency later."""
     goal: Float[np.ndarray, "t n 3"]
     """Goal position at `time`, world, m."""

@@ -16,6 +16,7 @@ from e2efly.config.drawing import INK
 from e2efly.config.env import FILE
 from e2efly.config.run import LEARNED
 from e2efly.control import COMMAND_MODES
+from e2efly.control.modes import rotor_names
 from e2efly.environment.episodes import Episodes, wilson
 from e2efly.runs.rundir import least_success
 from e2efly.vehicles.gravity import GRAVITY
@@ -169,9 +170,10 @@ def plot_time(flights: Flights, index: int, path: str | Path, title: str, vehicl
             ax.plot(time, flights.body_rate[:steps, index, i], color=color, label="actual")
             ax.set_ylabel(f"{name} rate (rad/s)")
         _command(thrust, asked, command, flights.command_mode)
-        for i, name in enumerate(("rear right", "front right", "rear left", "front left")):
-            color = (BLUE, VERMILLION, GREEN, PURPLE)[i]
-            rotor.plot(time, flights.rotor_speed[:steps, index, i], color=color, linewidth=1.2, label=name)
+        for i, name in enumerate(rotor_names(flights.rotor_speed.shape[-1])):
+            color, style = (BLUE, VERMILLION, GREEN, PURPLE)[i % 4], ("-", "--", ":", "-.")[i // 4]
+            curve = flights.rotor_speed[:steps, index, i]
+            rotor.plot(time, curve, color=color, linestyle=style, linewidth=1.2, label=name.replace("_", " "))
         if vehicle is not None:
             for ax, top in zip((roll, pitch, yaw), np.broadcast_to(vehicle.body_rate_max, 3), strict=True):
                 _bound(ax, float(top), both=True)
@@ -200,8 +202,8 @@ def _bound(ax: Axes, top: float, both: bool = False) -> None:
             ax.axhline(sign * top, color=INK, linewidth=1.2, linestyle=":")
 
 
-def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t 4"], name: str) -> None:
-    """Draw the collective thrust relative to gravity, if the mode has one. Otherwise all four command numbers."""
+def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t c"], name: str) -> None:
+    """Draw the collective thrust relative to gravity, if the mode has one. Otherwise all numbers of the command."""
     mode = COMMAND_MODES[name]
     if mode.fields[0] == "collective_thrust":
         ax.axhline(1.0, color=GREY, label="hover: 1 g", **_DASHED)

@@ -13,7 +13,7 @@ import pytest
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, step
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.state import Parts, split4
+from e2efly.simulation.physics.state import Parts, split
 from e2efly.vehicles.vehicle import Vehicle, quantities
 
 Fly = Callable[..., State]
@@ -85,7 +85,7 @@ def fly_open_loop() -> Fly:
 
         def one(parts: Parts, command: jax.Array) -> tuple[Parts, State]:
             def substep(_: jax.Array, parts: Parts) -> Parts:
-                return INTEGRATORS[integrator](parts_of_plant, parts, split4(command), air, dt)
+                return INTEGRATORS[integrator](parts_of_plant, parts, split(command), air, dt)
 
             parts = jax.lax.fori_loop(0, substeps, substep, parts)
             return parts, parts.join()

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics import State, body
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.state import split4
+from e2efly.simulation.physics.state import split
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix, quantities
@@ -54,7 +54,7 @@ def test_eulers_equation(vis_r: Vehicle) -> None:
 @pytest.mark.parametrize("name", ["vis_r", "vis_h", "crazyflie"])
 def test_rotor_wrench_is_the_allocation_matrix(name: str) -> None:
     vehicle, thrust = load_vehicle(name), np.abs(draws(4, 4))
-    collective, torque = body.rotor_wrench(plant(vehicle), split4(jnp.asarray(thrust)))
+    collective, torque = body.rotor_wrench(plant(vehicle), split(jnp.asarray(thrust)))
     actual = np.concatenate([np.asarray(collective)[:, None], torque.stack()], axis=-1)
     np.testing.assert_allclose(actual, thrust @ allocation_matrix(vehicle).T, rtol=1e-12, atol=1e-14)
 

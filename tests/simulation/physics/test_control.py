@@ -12,7 +12,7 @@ from e2efly.control import COMMAND_MODES, command_limits
 from e2efly.simulation.physics import Physics, State, rotation
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import rotor_thrust
-from e2efly.simulation.physics.state import split4
+from e2efly.simulation.physics.state import split
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
@@ -45,7 +45,7 @@ def test_rotor_thrust(answer: Callable[..., State], vacuum: Vehicle) -> None:
     asked = ((1.0, 2.0, 3.0, 4.0), (0.0, 1.5, 9.0, 1.5))
     path = answer("rotor_thrust", *asked)
     low, high = vacuum.thrust_range
-    reached = np.stack(rotor_thrust(Airframe.of(vacuum, 0.005), split4(path.rotor_speed[-1])), -1)
+    reached = np.stack(rotor_thrust(Airframe.of(vacuum, 0.005), split(path.rotor_speed[-1])), -1)
     np.testing.assert_allclose(reached, np.clip(asked, low, high), rtol=1e-9)
 
 
@@ -55,7 +55,7 @@ def test_body_rates_and_collective_thrust(answer: Callable[..., State], vacuum: 
     within = np.clip(asked[:, 1:], -vacuum.body_rate_max, vacuum.body_rate_max)
     np.testing.assert_allclose(path.body_rate[30, 0], within[0], atol=2e-3)  # after 1 s
     np.testing.assert_allclose(path.body_rate[-1], within, rtol=1e-2)
-    collective = sum(rotor_thrust(Airframe.of(vacuum, 0.005), split4(path.rotor_speed[-1]))) / vacuum.mass
+    collective = sum(rotor_thrust(Airframe.of(vacuum, 0.005), split(path.rotor_speed[-1]))) / vacuum.mass
     np.testing.assert_allclose(collective, asked[:, 0], rtol=1e-2)
 
 
@@ -63,7 +63,7 @@ def test_attitude_and_collective_thrust(answer: Callable[..., State], vacuum: Ve
     path = answer("attitude", (11.0, 0.3, -0.2, 1.0), (9.0, -0.5, 0.4, -3.0))
     np.testing.assert_allclose(level(path)[[60, -1]], [[[1.0, -0.2, 0.3], [-3.0, 0.4, -0.5]]] * 2, atol=2e-2)
     np.testing.assert_allclose(level(path)[-1], [[1.0, -0.2, 0.3], [-3.0, 0.4, -0.5]], atol=1e-6)
-    collective = sum(rotor_thrust(Airframe.of(vacuum, 0.005), split4(path.rotor_speed[-1]))) / vacuum.mass
+    collective = sum(rotor_thrust(Airframe.of(vacuum, 0.005), split(path.rotor_speed[-1]))) / vacuum.mass
     np.testing.assert_allclose(collective, [11.0, 9.0], rtol=1e-6)
 
 

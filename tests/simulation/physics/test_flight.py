@@ -12,7 +12,7 @@ from e2efly.control import COMMAND_MODES
 from e2efly.simulation.physics import INTEGRATORS, Physics, State, rotation
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import hover_rotor_speed, rotor_thrust
-from e2efly.simulation.physics.state import split4
+from e2efly.simulation.physics.state import split
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
@@ -189,6 +189,6 @@ def test_a_weaker_battery_sinks(vis_r: Vehicle, fly: Callable[..., State]) -> No
         physics_of(vis_r, "ctbr"), weak, at_rest(vis_r), jnp.broadcast_to(jnp.asarray([GRAVITY, 0, 0, 0]), (30, 4))
     )
     np.testing.assert_allclose(path.rotor_speed, vis_r.hover_rotor_speed, rtol=1e-9)
-    thrust = rotor_thrust(Airframe.of(weak, 0.005), split4(path.rotor_speed))[0][-1]
+    thrust = rotor_thrust(Airframe.of(weak, 0.005), split(path.rotor_speed))[0][-1]
     assert float(thrust) == pytest.approx(0.9 * vis_r.mass * GRAVITY / 4, rel=1e-9)
     assert float(path.velocity[-1, 2]) == pytest.approx(-0.1 * GRAVITY, rel=0.02)

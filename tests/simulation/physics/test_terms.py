@@ -35,6 +35,7 @@ NOTHING: dict[str, Any] = {
     "voltage_sag": 0.0,
     "speed_per_volt": 1.0,
     "rotor_speed_ceiling": [1e6] * 4,
+    "rotor_axis": [[0.0, 0.0, 1.0]] * 4,
 }
 """Values at which a term does nothing."""
 ACTING = VALUES | {"rotor_speed_ceiling": [2210.0, 2220.0, 2230.0, 1700.0]}

@@ -14,7 +14,7 @@ from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics import INTEGRATORS, State
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import derivative, rotor_speed_for
-from e2efly.simulation.physics.state import Parts, split4
+from e2efly.simulation.physics.state import Parts, split
 from e2efly.vehicles.vehicle import Vehicle
 
 pytestmark = pytest.mark.usefixtures("x64")
@@ -75,9 +75,9 @@ def test_rotors_that_are_bodies_of_their_own(stone: Vehicle, random_state: Calla
         (speed, change), h = driven, STEP
 
         def slope(rate: jax.Array, at: float) -> jax.Array:
-            turning = split4(speed + at * change)
+            turning = split(speed + at * change)
             parts = dataclasses.replace(quiet, body_rate=Vec3.of(rate), rotor_speed=turning)
-            return derivative(plant, parts, None, split4(change)).body_rate.stack()
+            return derivative(plant, parts, None, split(change)).body_rate.stack()
 
         a = slope(rate, 0.0)
         b = slope(rate + a * h / 2, h / 2)
@@ -115,7 +115,7 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
     data.qvel[3:] = start.body_rate
     for _ in range(2000):
         mujoco.mj_step(model, data)
-    speed = rotor_speed_for(vehicle, split4(jnp.asarray(thrust)))
+    speed = rotor_speed_for(vehicle, split(jnp.asarray(thrust)))
     end = flown(vehicle, dataclasses.replace(start, rotor_speed=jnp.stack(speed)), 2000)
     turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
     np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
@@ -125,6 +125,6 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
 
 def flown(vehicle: Vehicle, start: State, steps: int) -> State:
     """Our physics at constant rotor speeds."""
-    plant, speed = Airframe.of(vehicle, STEP), split4(start.rotor_speed)
+    plant, speed = Airframe.of(vehicle, STEP), split(start.rotor_speed)
     one = lambda _, parts: INTEGRATORS["rk4"](plant, parts, speed, None, STEP)  # noqa: E731
     return jax.lax.fori_loop(0, steps, one, Parts.of(start)).join()

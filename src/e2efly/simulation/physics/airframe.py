@@ -8,10 +8,35 @@ import numpy as np
 from jax import Array
 
 from e2efly.control.vectors import Vec3
-from e2efly.simulation.physics.state import split4
+from e2efly.simulation.physics.state import split
 from e2efly.vehicles.vehicle import Vehicle
 
-Rotors = tuple[Array, Array, Array, Array]
+Rotors = tuple[Array, ...]
+"""One array for each rotor, each of the batch's shape."""
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """What rotors that do not all push along body z do, for each newton that a rotor pushes."""
+
+    axis: tuple[Rotors, Rotors, Rotors]
+    """Force along body x, y and z: the components of the directions in which the rotors push."""
+    moment: tuple[Rotors, Rotors, Rotors]
+    """Torque about body x, y and z, with the reaction torque, m."""
+
+    @staticmethod
+    def of(vehicle: Vehicle) -> "Tilt | None":
+        """The tilt of a vehicle, any field of which may be batched. None if its file gives no axes of the rotors."""
+        if vehicle.rotor_axis is None:
+            return None
+        places, axes = vehicle.rotor_position, vehicle.rotor_axis
+        arm = [places[..., i] if i < places.shape[-1] else 0.0 * places[..., 0] for i in range(3)]
+        if vehicle.centre_of_mass is not None:
+            arm = [x - vehicle.centre_of_mass[..., i, None] for i, x in enumerate(arm)]
+        arms, axis = Vec3(*arm), Vec3(*(axes[..., i] for i in range(3)))
+        moment = arms.cross(axis) + axis * (vehicle.rotor_spin * jnp.asarray(vehicle.torque_ratio)[..., None])
+        pushes, turns = (tuple(split(part) for part in (v.x, v.y, v.z)) for v in (axis, moment))
+        return Tilt(pushes, turns)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -92,6 +117,8 @@ class Airframe:
     """Centre of mass relative to the point where the drag acts, body, m."""
     ceiling: Rotors | None = None
     """Highest speed that each rotor reaches, rad/s."""
+    tilt: Tilt | None = None
+    """Directions of the rotors. None: all push along body z."""
     push: tuple[Array, Array] | None = None
     """Acceleration by a force from outside, world, x and y, m/s^2."""
 
@@ -99,7 +126,7 @@ class Airframe:
     def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None, push: Array | None = None) -> "Airframe":
         """The plant of a vehicle, any field of which may be batched.
 
-        Sub-steps take `dt` seconds, `rotor_share` is (*n, 4), and `push` (*n, 2).
+        Sub-steps take `dt` seconds, `rotor_share` is (*n, r), and `push` (*n, 2).
         """
         v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
@@ -112,16 +139,16 @@ class Airframe:
             mobility, mobility_products = _inverse(inertia, products)
         return Airframe(
             thrust_map=(k2, k1, k0),
-            arm_x=split4(x),
-            arm_y=split4(y),
-            spin=split4(v.rotor_spin),
+            arm_x=split(x),
+            arm_y=split(y),
+            spin=split(v.rotor_spin),
             torque_ratio=v.torque_ratio,
             specific=1 / v.mass,
             inertia=inertia,
             mobility=mobility,
             drag_linear=Vec3.of(v.drag_linear),
             drag_quadratic=Vec3.of(v.drag_quadratic),
-            rotor_share=None if rotor_share is None else split4(rotor_share),
+            rotor_share=None if rotor_share is None else split(rotor_share),
             decay=_exp(-dt / time),
             half_decay=_exp(-0.5 * dt / time),
             rotor_inertia=v.rotor_inertia,
@@ -134,7 +161,8 @@ class Airframe:
             products=products,
             mobility_products=mobility_products,
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),
-            ceiling=None if v.rotor_speed_ceiling is None else split4(v.rotor_speed_ceiling),
+            ceiling=None if v.rotor_speed_ceiling is None else split(v.rotor_speed_ceiling),
+            tilt=Tilt.of(v),
             push=None if push is None else (push[..., 0], push[..., 1]),
         )
 

@@ -1,5 +1,8 @@
 """The rigid body: its forces and torques, and the resulting accelerations (paper, Quadrotor Dynamics)."""
 
+import operator
+from functools import reduce
+
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -11,17 +14,18 @@ from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
-jax.tree_util.register_dataclass(Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name"])
+jax.tree_util.register_dataclass(
+    Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name", "mixer"]
+)
 
 
 def rotor_thrust(plant: Airframe, rotor_speed: Rotors) -> Rotors:
     """Thrust of each rotor, N: the quadratic thrust map, never negative, times the rotor's share."""
     k2, k1, k0 = plant.thrust_map
-    a, b, c, d = (jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
+    thrust = tuple(jnp.maximum((k2 * w + k1) * w + k0, 0.0) for w in rotor_speed)
     if plant.rotor_share is None:
-        return a, b, c, d
-    s = plant.rotor_share
-    return a * s[0], b * s[1], c * s[2], d * s[3]
+        return thrust
+    return tuple(f * share for f, share in zip(thrust, plant.rotor_share, strict=True))
 
 
 def reached(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
@@ -33,36 +37,40 @@ def reached(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
     if battery is not None:
         voltage = battery.voltage
         if battery.sag is not None:
-            a, b, c, d = rotor_thrust(plant, rotor_speed)
-            voltage = jnp.maximum(voltage - battery.sag * (a + b + c + d), LEAST_VOLTAGE)
+            voltage = jnp.maximum(voltage - battery.sag * total(rotor_thrust(plant, rotor_speed)), LEAST_VOLTAGE)
         share = voltage if battery.exponent is None else voltage**battery.exponent
-        a, b, c, d = (share * speed for speed in command)
-        command = a, b, c, d
+        command = tuple(share * speed for speed in command)
     if plant.ceiling is None:
         return command
-    a, b, c, d = (jnp.minimum(speed, most) for speed, most in zip(command, plant.ceiling, strict=True))
-    return a, b, c, d
+    return tuple(jnp.minimum(speed, most) for speed, most in zip(command, plant.ceiling, strict=True))
 
 
 def rotor_speed_for(vehicle: Vehicle, thrust: Rotors) -> Rotors:
     """The rotor speed, rad/s, that gives each thrust, N (at or above the idle thrust)."""
     k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
     half, scale = k1 / (2 * k2), 1 / k2
-    a, b, c, d = (jnp.sqrt(half**2 + (f - k0) * scale) - half for f in thrust)
-    return a, b, c, d
+    return tuple(jnp.sqrt(half**2 + (f - k0) * scale) - half for f in thrust)
 
 
 def hover_rotor_speed(vehicle: Vehicle) -> Array:
-    """The speed, rad/s, at which four equal rotors carry the weight."""
-    f = vehicle.mass * GRAVITY / 4
-    return rotor_speed_for(vehicle, (f, f, f, f))[0]
+    """The speed, rad/s, at which equal rotors carry the weight."""
+    return rotor_speed_for(vehicle, (vehicle.mass * GRAVITY / vehicle.lift,))[0]
 
 
 def rotor_wrench(plant: Airframe, thrust: Rotors) -> tuple[Array, Vec3]:
     """Collective thrust along body z, N, and torque about the body axes, N*m, from rotor arms and reaction torques."""
-    collective = thrust[0] + thrust[1] + thrust[2] + thrust[3]
+    if plant.tilt is not None:
+        x, y, z = (_weighted(moment, thrust) for moment in plant.tilt.moment)
+        return _weighted(plant.tilt.axis[2], thrust), Vec3(x, y, z)
     roll, pitch = _weighted(plant.arm_y, thrust), -_weighted(plant.arm_x, thrust)
-    return collective, Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
+    return total(thrust), Vec3(roll, pitch, plant.torque_ratio * _weighted(plant.spin, thrust))
+
+
+def sideways(plant: Airframe, thrust: Rotors) -> tuple[Array, Array] | None:
+    """Force of tilted rotors along body x and y, N. None: all rotors push along body z."""
+    if plant.tilt is None:
+        return None
+    return _weighted(plant.tilt.axis[0], thrust), _weighted(plant.tilt.axis[1], thrust)
 
 
 def drag(plant: Airframe, air_velocity: Vec3) -> Vec3:
@@ -80,7 +88,9 @@ def air_velocity(attitude: Quat, velocity: Vec3, wind: Vec3 | None) -> Vec3:
 
 
 def acceleration(plant: Airframe, attitude: Quat, force: Vec3, collective: Array) -> Vec3:
-    """Acceleration of the centre of mass, world, m/s^2, from the drag, body, N, and the collective thrust, N."""
+    """Acceleration of the centre of mass, world, m/s^2, from the collective thrust, N, and all other force, body, N:
+    the drag, and what tilted rotors push sideways.
+    """
     a = attitude.rotate(Vec3(force.x, force.y, force.z + collective)) * plant.specific
     if plant.push is None:
         return Vec3(a.x, a.y, a.z - GRAVITY)
@@ -113,14 +123,23 @@ def gyroscopic_torque(inertia: Vec3, body_rate: Vec3, products: Vec3 | None = No
 
 
 def rotor_momentum_torque(
-    inertia: Array, spin: Rotors, body_rate: Vec3, rotor_speed: Rotors, rotor_acceleration: Rotors
+    inertia: Array,
+    spin: Rotors,
+    body_rate: Vec3,
+    rotor_speed: Rotors,
+    rotor_acceleration: Rotors,
+    axis: tuple[Rotors, Rotors, Rotors] | None = None,
 ) -> Vec3:
-    """Torque on the body from the angular momentum h of its rotors about body z, N*m: -(dh/dt + w x h).
+    """Torque on the body from the angular momentum h of its rotors about their axes, N*m: -(dh/dt + w x h).
 
-    A rotor turns against the air's torque on it, so h = -inertia * sum(spin * speed). The body's own inertia includes
-    the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia` is that
-    of one rotor, kg*m^2. Accelerations are in rad/s^2.
+    A rotor turns against the air's torque on it, so h = -inertia * sum(spin * speed * axis). The body's own inertia
+    includes the rotors as if they stood still, so that body and rotors together keep their angular momentum. `inertia`
+    is that of one rotor, kg*m^2. Accelerations are in rad/s^2. `axis` None: all rotors turn about body z.
     """
+    if axis is not None:
+        turns = [tuple(s * a for s, a in zip(spin, along, strict=True)) for along in axis]
+        momenta, changes = (Vec3(*(_weighted(turn, x) for turn in turns)) for x in (rotor_speed, rotor_acceleration))
+        return (changes + body_rate.cross(momenta)) * inertia
     momentum = -inertia * _weighted(spin, rotor_speed)
     change = -inertia * _weighted(spin, rotor_acceleration)
     return Vec3(-body_rate.y * momentum, body_rate.x * momentum, -change)
@@ -134,10 +153,16 @@ def accelerations(
     The wind is the velocity of the air in the world, m/s. Accelerations of the rotors, rad/s^2, are required if the
     plant has rotor inertia.
     """
-    collective, torque = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
+    thrust, tilt = rotor_thrust(plant, parts.rotor_speed), plant.tilt
+    collective, torque = rotor_wrench(plant, thrust)
     if plant.rotor_inertia is not None and rotor_acceleration is not None:
         torque = torque + rotor_momentum_torque(
-            plant.rotor_inertia, plant.spin, parts.body_rate, parts.rotor_speed, rotor_acceleration
+            plant.rotor_inertia,
+            plant.spin,
+            parts.body_rate,
+            parts.rotor_speed,
+            rotor_acceleration,
+            None if tilt is None else tilt.axis,
         )
     air = air_velocity(parts.attitude, parts.velocity, wind)
     if plant.centre is not None:  # the point at which the drag acts moves around the centre of mass
@@ -147,6 +172,8 @@ def accelerations(
         torque = torque + force.cross(plant.centre)
     if plant.drag_torque is not None:
         torque = torque - plant.drag_torque.times(parts.body_rate)
+    if (beside := sideways(plant, thrust)) is not None:
+        force = Vec3(force.x + beside[0], force.y + beside[1], force.z)
     linear = acceleration(plant, parts.attitude, force, collective)
     return linear, angular_acceleration(plant, parts.body_rate, torque)
 
@@ -163,9 +190,14 @@ def derivative(plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_accelerat
         velocity=linear,
         attitude=parts.attitude.derivative(parts.body_rate),
         body_rate=angular,
-        rotor_speed=(zero, zero, zero, zero),
+        rotor_speed=(zero,) * len(parts.rotor_speed),
     )
 
 
+def total(rotors: Rotors) -> Array:
+    """The sum over all rotors."""
+    return reduce(operator.add, rotors)
+
+
 def _weighted(a: Rotors, b: Rotors) -> Array:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    return reduce(operator.add, (x * y for x, y in zip(a, b, strict=True)))

@@ -17,7 +17,8 @@ from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, RateLoop
 from e2efly.vehicles.vehicle import Vehicle
 
-Command = tuple[Array, Array, Array, Array]
+Command = tuple[Array, ...]
+"""Four numbers, or one for each rotor in the modes of rotor thrusts."""
 Law = Callable[[Vehicle, Mixer, Parts, Command, RateLoop | None], Rotors]
 """(nominal vehicle, its mixer, state, command, memory of the rate loop) -> rotor speed commands, rad/s."""
 
@@ -29,10 +30,9 @@ def control_law(mode: CommandMode) -> Law:
     def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command, memory: RateLoop | None = None) -> Rotors:
         if controller is None:
             if mode.of_largest:
-                a, b, c, d = (share * mixer.thrust_max for share in command)
-                command = a, b, c, d
+                command = tuple(share * mixer.thrust_max for share in command)
             return rotor_speed_for(vehicle, mixer.limit(command))
-        return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, command), memory)
+        return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, _four(command)), memory)
 
     return law
 
@@ -61,12 +61,19 @@ def remembered(
         seen = followed + (memory.seen - followed) * left
         turned = turned - (seen - memory.seen) * lag
     if memory.integral is not None:
-        wanted = (mode.controller(vehicle, begin, command).rate + mode.controller(vehicle, now, command).rate) * 0.5
+        wanted = (
+            mode.controller(vehicle, begin, _four(command)).rate + mode.controller(vehicle, now, _four(command)).rate
+        ) * 0.5
         # limited to the proportional part at an error of `body_rate_max`, so that it does not wind up when rotors
         # saturate
         most = Vec3.of(vehicle.rate_gain * vehicle.body_rate_max)
         integral = (memory.integral + Vec3.of(vehicle.rate_integral_gain).times(wanted * time - turned)).clip(most)
     return RateLoop(integral, seen)
+
+
+def _four(command: Command) -> tuple[Array, Array, Array, Array]:
+    a, b, c, d = command
+    return a, b, c, d
 
 
 def _rates(vehicle: Vehicle, mixer: Mixer, rate: Vec3, wanted: Ctbr, memory: RateLoop | None) -> Rotors:

@@ -29,10 +29,8 @@ def lagged(
     it is `decay_down`, unless that is None.
     """
     if decay_down is None:
-        a, b, c, d = (u + (w - u) * decay for w, u in zip(speed, command, strict=True))
-    else:
-        a, b, c, d = (u + (w - u) * jnp.where(u < w, decay_down, decay) for w, u in zip(speed, command, strict=True))
-    return a, b, c, d
+        return tuple(u + (w - u) * decay for w, u in zip(speed, command, strict=True))
+    return tuple(u + (w - u) * jnp.where(u < w, decay_down, decay) for w, u in zip(speed, command, strict=True))
 
 
 def ahead(plant: Airframe, parts: Parts, wind: Vec3 | None, dt: float) -> tuple[Parts, float]:
@@ -109,8 +107,7 @@ def _rate(plant: Airframe, parts: Parts, rotor_speed: Rotors, command: Rotors, w
     if plant.rotor_inertia is not None and plant.lag_rate is not None:
         up, down = plant.lag_rate, plant.lag_rate_down
         rates = (up if down is None else jnp.where(u < w, down, up) for w, u in zip(rotor_speed, command, strict=True))
-        a, b, c, d = ((u - w) * rate for w, u, rate in zip(rotor_speed, command, rates, strict=True))
-        change = a, b, c, d
+        change = tuple((u - w) * rate for w, u, rate in zip(rotor_speed, command, rates, strict=True))
     return derivative(plant, dataclasses.replace(parts, rotor_speed=rotor_speed), wind, change)
 
 
@@ -121,8 +118,7 @@ def _mean_change(plant: Airframe, before: Rotors, after: Rotors, dt: float) -> R
     """
     if plant.rotor_inertia is None:
         return None
-    a, b, c, d = ((end - start) / dt for start, end in zip(before, after, strict=True))
-    return a, b, c, d
+    return tuple((end - start) / dt for start, end in zip(before, after, strict=True))
 
 
 def _advance(parts: Parts, rate: Parts, dt: float) -> Parts:

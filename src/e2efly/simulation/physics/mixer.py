@@ -1,36 +1,50 @@
 """From collective thrust and torque to rotor thrusts, with the flight controller's nominal vehicle."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from e2efly.control.allocation import Allocation, ThrustLimits, nearest, shifted
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics.airframe import Rotors
-from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
+from e2efly.simulation.physics.state import split
+from e2efly.vehicles.vehicle import MixerRule, Vehicle
 
 
-@jax.tree_util.register_dataclass
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["matrix", "thrust_min", "thrust_max", "plain", "descent", "pull"],
+    meta_fields=["rule"],
+)
 @dataclass(frozen=True)
 class Mixer:
-    """The inverse of the rotor geometry of the nominal vehicle, and its thrust limits."""
+    """The inverse of the rotor geometry of the nominal vehicle, its thrust limits, and how they are kept."""
 
     matrix: np.ndarray | Array
-    """(*n, 4, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
+    """(*n, N, 4): rotor thrusts, N, from [collective, N; roll, pitch, yaw torque, N*m]."""
     thrust_min: float | Array
     """Thrust of a rotor at idle, N."""
     thrust_max: float | Array
     """Largest thrust of a rotor, N."""
     plain: Array | None = None
-    """1: each rotor is clipped by itself. 0: attitude has priority over thrust. Shape (*n,). None: 0."""
+    """1: each rotor is clipped by itself. 0: `rule`. Shape (*n,). None: 0."""
+    rule: MixerRule = "betaflight"
+    descent: np.ndarray | Array | None = None
+    """(N, N), and `pull` (N, 4): as of `Allocation`, for the rule `qp`."""
+    pull: np.ndarray | Array | None = None
 
     @staticmethod
     def of(vehicle: Vehicle, dtype: type = np.float32) -> "Mixer":
         """The mixer of a loaded (not traced) vehicle."""
-        low, high = vehicle.thrust_range
-        return Mixer(np.linalg.inv(allocation_matrix(vehicle)).astype(dtype), dtype(low), dtype(high))
+        (low, high), found = vehicle.thrust_range, Allocation.of(vehicle)
+        descent, pull = (None if x is None else x.astype(dtype) for x in (found.descent, found.pull))
+        return Mixer(found.matrix.astype(dtype), dtype(low), dtype(high), None, found.rule, descent, pull)
 
     @staticmethod
     def of_each(vehicle: Vehicle) -> "Mixer":
@@ -49,32 +63,25 @@ class Mixer:
 
     def limit(self, thrust: Rotors) -> Rotors:
         """The thrust of each rotor, clipped to the rotor's limits."""
-        a, b, c, d = (jnp.clip(f, self.thrust_min, self.thrust_max) for f in thrust)
-        return a, b, c, d
+        return self._limits.clip(thrust)
 
     def thrusts(self, collective: Array, torque: Vec3) -> Rotors:
-        """Rotor thrusts within the limits, N. Attitude has priority over thrust, as in Betaflight's mixer.
+        """Rotor thrusts within the limits, N. Attitude has priority over thrust."""
+        wrench = collective, torque.x, torque.y, torque.z
+        if self.rule == "qp" and self.descent is not None and self.pull is not None:
+            matrices = _rows(self.matrix), _rows(self.descent), _rows(self.pull)
+            return nearest(matrices, jnp.broadcast_arrays(*wrench), self._limits, self.plain, _scan)
+        return shifted(self.rule, _rows(self.matrix), wrench, self._limits, self.plain)
 
-        If the torque needs a larger span than a rotor has, the whole torque is scaled down. Then the collective thrust
-        is shifted until every rotor is inside its limits.
-        """
-        m = self.matrix
-        spread = [m[..., i, 1] * torque.x + m[..., i, 2] * torque.y + m[..., i, 3] * torque.z for i in range(4)]
-        span = _max4(spread) - _min4(spread)
-        available = self.thrust_max - self.thrust_min
-        scale = available / jnp.maximum(span, available)
-        if self.plain is not None:
-            scale = scale + (1 - scale) * self.plain
-        asked = [m[..., i, 0] * collective + scale * spread[i] for i in range(4)]
-        shift = jnp.maximum(self.thrust_min - _min4(asked), 0.0) - jnp.maximum(_max4(asked) - self.thrust_max, 0.0)
-        if self.plain is not None:
-            shift = shift * (1 - self.plain)
-        return self.limit((asked[0] + shift, asked[1] + shift, asked[2] + shift, asked[3] + shift))
+    @property
+    def _limits(self) -> ThrustLimits:
+        return ThrustLimits(self.thrust_min, self.thrust_max, jnp.maximum, jnp.minimum)
 
 
-def _max4(x: list[Array]) -> Array:
-    return jnp.maximum(jnp.maximum(x[0], x[1]), jnp.maximum(x[2], x[3]))
+def _rows(matrix: np.ndarray | Array) -> list[Rotors]:
+    return [split(jnp.asarray(matrix[..., i, :])) for i in range(matrix.shape[-2])]
 
 
-def _min4(x: list[Array]) -> Array:
-    return jnp.minimum(jnp.minimum(x[0], x[1]), jnp.minimum(x[2], x[3]))
+def _scan(step: Callable[[Any, Any], Any], first: Any, numbers: Sequence[float]) -> Any:
+    paces = jnp.asarray(numbers, first[0][0].dtype)
+    return jax.lax.scan(lambda carry, pace: (step(carry, pace), None), first, paces)[0]

@@ -52,8 +52,9 @@ class State:
     """Unit quaternion wxyz, body to world."""
     body_rate: Float[Array, "*n 3"]
     """Angular velocity in the body frame, rad/s."""
-    rotor_speed: Float[Array, "*n 4"]
-    """Rotor speeds: rear right, front right, rear left, front left, rad/s."""
+    rotor_speed: Float[Array, "*n r"]
+    """Rotor speeds in the order of the vehicle file, rad/s. Of a quadrotor: rear right, front right, rear left, front
+    left."""
     rate_loop: RateLoop | None = None
     """State of the rate loop, if the loop has one. None at the start of a flight."""
 
@@ -67,7 +68,7 @@ class State:
             velocity=jnp.zeros_like(position),
             quaternion=jnp.broadcast_to(jnp.array([1.0, 0, 0, 0], dtype), (*batch, 4)),
             body_rate=jnp.zeros_like(position),
-            rotor_speed=jnp.full((*batch, 4), vehicle.hover_rotor_speed, dtype),
+            rotor_speed=jnp.full((*batch, vehicle.rotor_count), vehicle.hover_rotor_speed, dtype),
         )
 
 
@@ -80,7 +81,7 @@ class Parts:
     velocity: Vec3
     attitude: Quat
     body_rate: Vec3
-    rotor_speed: tuple[Array, Array, Array, Array]
+    rotor_speed: tuple[Array, ...]
 
     @staticmethod
     def of(state: State) -> "Parts":
@@ -90,7 +91,7 @@ class Parts:
             Vec3.of(state.velocity),
             Quat.of(state.quaternion),
             Vec3.of(state.body_rate),
-            split4(state.rotor_speed),
+            split(state.rotor_speed),
         )
 
     def join(self) -> State:
@@ -104,6 +105,6 @@ class Parts:
         )
 
 
-def split4(array: Float[Array, "*n 4"]) -> tuple[Array, Array, Array, Array]:
-    """The four entries along the last axis."""
-    return array[..., 0], array[..., 1], array[..., 2], array[..., 3]
+def split(array: Float[Array, "*n k"]) -> tuple[Array, ...]:
+    """The entries along the last axis."""
+    return tuple(array[..., i] for i in range(array.shape[-1]))

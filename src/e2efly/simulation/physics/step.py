@@ -17,7 +17,7 @@ from e2efly.simulation.physics.body import reached
 from e2efly.simulation.physics.control import Command, control_law, remembered
 from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
-from e2efly.simulation.physics.state import Parts, RateLoop, State, split4
+from e2efly.simulation.physics.state import Parts, RateLoop, State, split
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
 
 RATES = (0.1, 10_000.0)
@@ -115,12 +115,12 @@ def step(
     physics: Physics,
     vehicle: Vehicle,
     state: State,
-    command: Float[Array, "*n 4"],
+    command: Float[Array, "*n c"],
     *,
-    previous: Float[Array, "*n 4"] | None = None,
+    previous: Float[Array, "*n c"] | None = None,
     switch_time: Float[Array, "*n"] | None = None,
     wind: Float[Array, "*n 3"] | None = None,
-    rotor_share: Float[Array, "*n 4"] | None = None,
+    rotor_share: Float[Array, "*n r"] | None = None,
     push: Float[Array, "*n 2"] | None = None,
 ) -> State:
     """Advance the state by one control period.
@@ -146,8 +146,8 @@ def step(
     plant = Airframe.of(vehicle, dt, rotor_share, push)
     controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
-    after = split4(command)
-    before = None if previous is None else split4(previous)
+    after = split(command)
+    before = None if previous is None else split(previous)
 
     def substep(carry: tuple[Parts, RateLoop | None], index: Array) -> tuple[tuple[Parts, RateLoop | None], None]:
         parts, loop = carry
@@ -159,8 +159,7 @@ def step(
         memory = None if loop is None else remembered(mode, controller, loop, parts, middle, acting, time)
         rotor_command = control_law(mode)(controller, physics.mixer, middle, acting, memory)
         if physics.full_speed is not None:
-            a, b, c, d = (jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
-            rotor_command = a, b, c, d
+            rotor_command = tuple(jnp.minimum(speed, physics.full_speed) for speed in rotor_command)
         moved = integrate(plant, parts, reached(plant, parts.rotor_speed, rotor_command), air, dt)
         return (moved, None if loop is None else remembered(mode, controller, loop, parts, moved, acting, dt)), None
 
@@ -178,5 +177,4 @@ def step(
 
 
 def _blend(before: Command, after: Command, share: Array) -> Command:
-    a, b, c, d = (x + (y - x) * share for x, y in zip(before, after, strict=True))
-    return a, b, c, d
+    return tuple(x + (y - x) * share for x, y in zip(before, after, strict=True))

@@ -15,6 +15,7 @@ from e2efly.validation.plant import MOMENT, Plant, RigidState, Shutter, check_mo
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 FLOOR_M = 0.02
 """Distance of AirSim's floor below the floor of our world, m. AirSim's collisions end a descent slightly above the
@@ -107,6 +108,7 @@ class AirsimPlant(Plant):
             OSError: naming the address, when AirSim does not answer or refuses.
         """
         check_mode(mode, self.name, rates=True)
+        check_quadrotor(vehicle, "plant 'airsim'")
         self.vehicle, self.mode = vehicle, mode
         self._cameras: list[AirSimCamera] = []
         self._shutters: Mapping[str, Shutter] = {}

@@ -13,6 +13,7 @@ from e2efly.flight.pilot.hover import controlled
 from e2efly.validation.plant import EVERYTHING, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 if TYPE_CHECKING:
     from e2efly.flight.bridge import Bridge
@@ -44,6 +45,7 @@ class BetaflightPlant(Plant):
             OSError: when the firmware cannot be built or started, or does not take off.
         """
         check_mode(mode, self.name, rates=True)
+        check_quadrotor(vehicle, "plant 'betaflight'")
         from e2efly.validation import firmware_program
         from e2efly.validation.bridge_session import Session, rehearsal_settings
         from e2efly.validation.rig import Rig
@@ -77,6 +79,7 @@ class BetaflightPlant(Plant):
         """
         if plain_mixer:
             raise ValueError("plant 'betaflight' has the firmware's own mixer; accepted: plain_mixer False")
+        check_quadrotor(body, "plant 'betaflight'")
         self._body = body
         self._rig.carry(body)
 

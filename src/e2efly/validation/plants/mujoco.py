@@ -12,6 +12,7 @@ explanation:
 - MuJoCo's fluid models derive the drag from a body's box or ellipsoid, and have no coefficients per axis. Each axis
   therefore has an actuator without input whose force depends on its own velocity, -(k1 + k2 |v|) v, with |v| from the
   last step. Wind is subtracted from that velocity, in the body frame of the last step.
+- A rotor that is tilted pushes, turns the body and has its angular momentum along its axis.
 - The angular momentum of the rotors is included if the vehicle has rotor inertia. Over a step the rotors give the body
   the momentum that they lose, and the torque w x h. The body rate w is that in the middle of the step, extrapolated
   from its last change.
@@ -31,7 +32,7 @@ from e2efly.validation.flight_controller import FlightController, rotor_speed_of
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles.gravity import GRAVITY
-from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle, inertia_tensor, rotor_arms
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle, inertia_tensor, rotor_arms, rotor_axes, rotor_places
 from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
 STEP = 1e-3
@@ -53,11 +54,15 @@ def vehicle_xml(vehicle: Vehicle) -> str:
     centre = np.zeros(3) if vehicle.centre_of_mass is None else vehicle.centre_of_mass
     dx, dy, dz = (-centre).tolist()  # the body's frame has its origin in the centre of mass
     sites, feet, actuators = [f'<site name="centre" pos="{dx} {dy} {dz}"/>'], [], []
-    for i, ((x, y), spin) in enumerate(zip(rotor_arms(vehicle), vehicle.rotor_spin, strict=True)):
-        sites.append(f'<site name="rotor_{i}" pos="{x} {y} {dz}"/>')
+
+    axes, feet_at = rotor_axes(vehicle).tolist(), rotor_arms(vehicle).tolist()
+    rotors = zip(rotor_places(vehicle).tolist(), feet_at, axes, vehicle.rotor_spin, strict=True)
+    for i, (place, (x, y), axis, spin) in enumerate(rotors):
+        gear = " ".join(map(str, [*axis, *(float(spin) * ratio * along for along in axis)]))
+        sites.append(f'<site name="rotor_{i}" pos="{" ".join(map(str, place))}"/>')
         feet.append(f'<geom name="foot_{i}" type="sphere" size="{FOOT}" pos="{x} {y} {FOOT - vehicle.feet_height}"/>')
         actuators.append(
-            f'<general name="motor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {spin * ratio}" dyntype="filter" '
+            f'<general name="motor_{i}" site="rotor_{i}" gear="{gear}" dyntype="filter" '
             f'dynprm="{lag}" gainprm="{2 * k2 * hover + k1}" biastype="affine" biasprm="{k0 - k2 * hover**2}"/>'
         )
     drags = [("drag", "{} 0 0 0", vehicle.drag_linear), ("drag_torque", "0 0 0 {}", vehicle.drag_torque)]
@@ -139,7 +144,7 @@ class MujocoPlant(Plant):
 
     @property
     def rotor_speed(self) -> np.ndarray:
-        """(4,) rotor speeds: rear right, front right, rear left, front left, rad/s."""
+        """(r,) rotor speeds in the order of the vehicle file, rad/s."""
         return self.data.act.copy()
 
     def reset(self, state: RigidState) -> None:
@@ -148,16 +153,18 @@ class MujocoPlant(Plant):
         self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
         self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
         self.data.act[:] = self._body.hover_rotor_speed
-        self._wind, self._share, self._last_rate = _CALM, np.ones(4), state.body_rate
+        self._wind, self._share, self._last_rate = _CALM, np.ones(self._body.rotor_count), state.body_rate
         self._controller.start(state.body_rate.tolist())
         self._mujoco.mj_forward(self.model, self.data)  # computes the velocities from which the drag starts
 
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command, (4,), for `dt` s, in equal steps."""
+        """Hold a command for `dt` s, in equal steps."""
         count = math.ceil((dt - MOMENT) / self._largest_step)
         model, data, wanted = self.model, self.data, command.tolist()
         told, (k2, k1, k0) = self._believed.thrust_map.tolist(), self._body.thrust_map.tolist()
         linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
+        rotors = slice(self._body.rotor_count)
+        drags = slice(rotors.stop, rotors.stop + 3)
         for _ in range(count):
             model.opt.timestep = dt / count
             period, rate = dt / count, data.qvel[3:].copy()
@@ -166,15 +173,15 @@ class MujocoPlant(Plant):
             thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), motion, period)
             speed = data.act.copy()
             reached = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
-            data.ctrl[:4] = np.minimum(reached, self._ceiling)
-            model.actuator_dynprm[:4, 0] = self._lags()
-            model.actuator_gainprm[:4, 0] = share * (2 * k2 * speed + k1)
-            model.actuator_biasprm[:4, 0] = share * (k0 - k2 * speed * speed)
+            data.ctrl[rotors] = np.minimum(reached, self._ceiling)
+            model.actuator_dynprm[rotors, 0] = self._lags()
+            model.actuator_gainprm[rotors, 0] = share * (2 * k2 * speed + k1)
+            model.actuator_biasprm[rotors, 0] = share * (k0 - k2 * speed * speed)
             wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
             air = np.array([wind.x, wind.y, wind.z])
-            drag = linear + quadratic * np.abs(data.actuator_velocity[4:7] - air)
-            model.actuator_biasprm[4:7, 0] = drag * air
-            model.actuator_biasprm[4:7, 2] = -drag
+            drag = linear + quadratic * np.abs(data.actuator_velocity[drags] - air)
+            model.actuator_biasprm[drags, 0] = drag * air
+            model.actuator_biasprm[drags, 2] = -drag
             if self._body.rotor_inertia is not None:
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._last_rate = rate
@@ -196,17 +203,17 @@ class MujocoPlant(Plant):
         It does not change on the way, because a rotor does not pass its command.
         """
         up, down = self._body.motor_time_constant, self._body.motor_time_constant_down
-        return np.where(self.data.ctrl[:4] < self.data.act, up if down is None else down, up)
+        told = self.data.ctrl[: self._body.rotor_count]
+        return np.where(told < self.data.act, up if down is None else down, up)
 
     def _rotor_torque(self, dt: float) -> np.ndarray:
         """Mean torque on the body from the angular momentum of its rotors over the next step, body axes, N*m."""
         body, data = self._body, self.data
-        now, told, lag = data.act, data.ctrl[:4], self._lags()
+        now, told, lag = data.act, data.ctrl[: body.rotor_count], self._lags()
         after = told + (now - told) * np.exp(-dt / lag)
-        inertia = -body.rotor_inertia * body.rotor_spin  # a rotor turns against its reaction torque
+        # a rotor turns against its reaction torque
+        inertia = -body.rotor_inertia * body.rotor_spin * rotor_axes(body).T
         before = inertia @ now
         change = inertia @ after - before
-        rate = data.qvel[3:]
-        p, q, _ = 1.5 * rate - 0.5 * self._last_rate
-        middle = before + change / 2
-        return np.array([-q * middle, p * middle, -change / dt])
+        middle_rate = 1.5 * data.qvel[3:] - 0.5 * self._last_rate
+        return -np.cross(middle_rate, before + change / 2) - change / dt

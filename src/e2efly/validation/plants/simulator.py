@@ -41,7 +41,7 @@ class SimulatorPlant(Plant):
         physics = Physics.of(vehicle, command_mode, control_rate=control_rate)
         self._step = physics.control_period / physics.substeps
         self._physics = dataclasses.replace(physics, control_period=self._step, substeps=1)
-        self._advance, self._hover = jax.jit(_advance), vehicle.hover_rotor_speed
+        self._advance, self._hover = jax.jit(_advance), np.full(vehicle.rotor_count, vehicle.hover_rotor_speed)
         self._made, self._air = self._physics, _STILL
         self.reset(RigidState(np.zeros(3), np.zeros(3), np.eye(4)[0], np.zeros(3)))
 
@@ -54,7 +54,7 @@ class SimulatorPlant(Plant):
         """Fly another body from the next `reset` on, which the flight controller does not know."""
         mixer = dataclasses.replace(self._made.mixer, plain=np.float32(plain_mixer))
         self._physics = dataclasses.replace(self._made, mixer=mixer).flying(body)
-        self._hover = body.hover_rotor_speed
+        self._hover = np.full(body.rotor_count, body.hover_rotor_speed)
 
     def disturb(self, wind: np.ndarray, rotor_share: np.ndarray) -> None:
         """Set wind and shares of thrust from now on."""
@@ -71,11 +71,11 @@ class SimulatorPlant(Plant):
 
         from e2efly.simulation.physics import State, started
 
-        arrays = (state.position, state.velocity, state.quaternion, state.body_rate, np.full(4, self._hover))
+        arrays = (state.position, state.velocity, state.quaternion, state.body_rate, self._hover)
         p, v, q, w, speed = (jnp.asarray(x, jnp.float32) for x in arrays)
         begin = State(p, v, q, w, speed)
         self._state = started(self._physics, self._physics.flown, begin)
-        self._filled, self._mean, self._air = 0.0, np.zeros(4), _STILL
+        self._filled, self._mean, self._air = 0.0, 0.0, _STILL
 
     def step(self, command: np.ndarray, dt: float) -> None:
         """Hold a command, (4,), for `dt` s."""
@@ -85,8 +85,9 @@ class SimulatorPlant(Plant):
             self._filled += part
             dt -= part
             if self._filled > self._step - MOMENT:
-                self._state = self._advance(self._physics, self._state, self._mean.astype(np.float32), *self._air)
-                self._filled, self._mean = 0.0, np.zeros(4)
+                mean = np.asarray(self._mean, np.float32)
+                self._state = self._advance(self._physics, self._state, mean, *self._air)
+                self._filled, self._mean = 0.0, 0.0
 
 
 def _advance(physics: Any, state: Any, command: Any, wind: Any, rotor_share: Any) -> Any:

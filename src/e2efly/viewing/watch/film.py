@@ -213,7 +213,7 @@ def _heading(frame: StageFrame) -> Float[np.ndarray, "2"]:
 def snapshot(stage: Stage, frame: StageFrame, size: tuple[int, int] = SIZE) -> UInt8[np.ndarray, "h w 3"]:
     """The picture of one moment, from behind the first vehicle."""
     shape, radius = quadrotor(stage.vehicle), _radius(stage)
-    angle = np.zeros((len(frame.position), 4))
+    angle = np.zeros((len(frame.position), len(shape.rotors)))
     soup = _standing(stage) + _moving(stage, frame.time, np.zeros(3)) + _flying(shape, frame, angle, radius)
     return picture(soup, *behind(frame.position[0], _heading(frame), radius, stage.ground), stage.ground, size)
 
@@ -260,7 +260,7 @@ def film(
     """
     first = source.stage_of(0)
     stage, still, shape = first, _standing(first), quadrotor(first.vehicle)
-    angle, past, eye = np.zeros((1, 4)), deque[np.ndarray](maxlen=PAST), np.zeros(3)
+    angle, past, eye = np.zeros((1, 1)), deque[np.ndarray](maxlen=PAST), np.zeros(3)
     heading, follows = np.zeros(2), 1 - np.exp(-source.period / TURN_S)
     flown, due = 0.0, 1 / rate
     while flown < seconds - 1e-9:

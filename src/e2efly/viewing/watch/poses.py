@@ -62,9 +62,9 @@ class Poses:
         told = f"no good pose from {self.source.describe()}{f' ({self._refused})' if self._refused else ''}"
         if o is None:
             level, still = np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3))
-            return StageFrame(now - self._began, nowhere, level, still, np.zeros((1, 4)), note=told)
+            return StageFrame(now - self._began, nowhere, level, still, np.zeros((1, 1)), note=told)
         speed = float(np.linalg.norm(o.velocity))
-        turning = np.full((1, 4), 0.0 if lost else TURNING)
+        turning = np.full((1, 1), 0.0 if lost else TURNING)
         place = ", ".join(f"{x:.2f}" for x in o.position)
         note = f"{place} m, {speed:.1f} m/s" + (f"\n{told}" if lost else "")
         return StageFrame(

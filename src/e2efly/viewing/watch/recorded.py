@@ -32,8 +32,9 @@ class RecordedFlight:
     """wxyz, body to world."""
     velocity: Float[np.ndarray, "t 3"]
     """World, m/s."""
-    rotor_speed: Float[np.ndarray, "t 4"]
-    """Rotor speeds, rad/s. If only motor outputs are known, they are computed from these. 0 if nothing is known."""
+    rotor_speed: Float[np.ndarray, "t r"]
+    """Rotor speeds, rad/s: one for each rotor, or one for all. If only motor outputs are known, they are computed from
+    these. 0 if nothing is known."""
     goal: Float[np.ndarray, "t 3"]
     """Goal positions, m. NaN where not known."""
     command: Float[np.ndarray, "t 3"]
@@ -63,6 +64,8 @@ def read_flight(path: Path, vehicle: Vehicle) -> RecordedFlight:
     if "rotor_speed" not in streams and "motor" in streams:
         time, share = streams["motor"]
         streams["rotor_speed"] = time, share * float(np.max(vehicle.rotor_speed_max))
+    if "rotor_speed" in streams and streams["rotor_speed"][1].shape[-1] != vehicle.rotor_count:
+        del streams["rotor_speed"]  # of a vehicle with other rotors
     if "setpoint" in streams:
         streams["command"] = streams["setpoint"]
     flight = even(path.name, streams)
@@ -90,11 +93,12 @@ def even(name: str, streams: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Rec
         return np.column_stack([np.interp(time, when, column) for column in values.T[-width:]])
 
     position, quaternion = at("position", 3), at("quaternion", 4)
+    rotors = streams["rotor_speed"][1].shape[-1] if "rotor_speed" in streams else 1
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     flown = np.gradient(position, PERIOD, axis=0) if len(time) > 1 else np.zeros_like(position)
     return RecordedFlight(
         name, position, quaternion, at("velocity", 3) if "velocity" in streams else flown,
-        at("rotor_speed", 4, 0.0), at("goal", 3), at("command", 3), at("body_rate", 3),
+        at("rotor_speed", rotors, 0.0), at("goal", 3), at("command", 3), at("body_rate", 3),
     )  # fmt: skip
 
 

@@ -132,7 +132,7 @@ def flight_of(name: str, begin: Any, flights: Flights, row: int) -> RecordedFlig
         return np.concatenate([getattr(begin, of)[None], getattr(flights, of)[:steps, row]])
 
     streams = {of: (time, whole(of)) for of in ("position", "velocity", "quaternion", "body_rate")}
-    streams["rotor_speed"] = time, np.full((len(time), 4), TURNING)
+    streams["rotor_speed"] = time, np.full((len(time), 1), TURNING)
     asked = flights.time[:steps] - period
     if steps:
         streams["goal"] = asked, flights.goal[:steps, row]

@@ -38,8 +38,8 @@ class StageFrame:
     """Unit quaternion, wxyz, body to world."""
     velocity: Float[np.ndarray, "n 3"]
     """World, m/s."""
-    rotor_speed: Float[np.ndarray, "n 4"]
-    """Rotor speeds, rad/s. Zero if not known."""
+    rotor_speed: Float[np.ndarray, "n r"]
+    """Rotor speeds, rad/s: one for each rotor, or one for all of them. Zero if not known."""
     goal: Float[np.ndarray, "n 3"] | None = None
     """Goal positions, m. NaN: no goal."""
     images: dict[str, np.ndarray] = field(default_factory=dict)

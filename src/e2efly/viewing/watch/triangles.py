@@ -53,9 +53,9 @@ class Quadrotor:
     """Meshes in the body frame."""
     rotor: Mesh
     """Two blades at the origin. They turn about z."""
-    rotors: Float[np.ndarray, "4 3"]
+    rotors: Float[np.ndarray, "r 3"]
     """Positions of the rotors, body frame, m."""
-    spin: Float[np.ndarray, "4"]
+    spin: Float[np.ndarray, " r"]
     """Sign of the rotation about body z. Counter-clockwise as seen from above is positive."""
 
 
@@ -93,7 +93,8 @@ def quadrotor(vehicle: Vehicle) -> Quadrotor:
     """The meshes of a vehicle: arms from the middle to the rotors, the front ones in orange. The sizes follow from the
     positions of the rotors.
     """
-    places = np.asarray(vehicle.rotor_position, float).reshape(-1, 4, 2)[0]
+    count, given = vehicle.rotor_count, np.asarray(vehicle.rotor_position, float)
+    places = given.reshape(-1, count, given.shape[-1])[0, :, :2]
     apart = min(float(np.linalg.norm(a - b)) for i, a in enumerate(places) for b in places[:i])
     thick, reach = 0.07 * apart, REACH * apart
     front = places[:, 0] > places[:, 0].mean()
@@ -112,9 +113,9 @@ def quadrotor(vehicle: Vehicle) -> Quadrotor:
     )
     blade = box([reach / 2, 0.06 * apart, 0.08 * thick])
     blades = np.concatenate([blade + np.array([side * reach / 2, 0, 0]) for side in (-1, 1)])
-    height = np.full((4, 1), 1.15 * thick)
+    height = np.full((count, 1), 1.15 * thick)
     # the reaction torque on the body is opposite to the rotation of the rotor
-    spin = -np.sign(np.asarray(vehicle.rotor_spin, float).reshape(-1, 4)[0])
+    spin = -np.sign(np.asarray(vehicle.rotor_spin, float).reshape(-1, count)[0])
     return Quadrotor(body, mesh_of(blades, BLADE), np.concatenate([places, height], axis=1), spin)
 
 
@@ -136,9 +137,9 @@ def spun(
     shape: Quadrotor,
     position: Float[np.ndarray, "n 3"],
     quaternion: Float[np.ndarray, "n 4"],
-    angle: Float[np.ndarray, "n 4"],
+    angle: Float[np.ndarray, "n r"],
 ) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 4"]]:
-    """Positions and attitudes of the m = 4 n rotors of n vehicles, in the world.
+    """Positions and attitudes of the m = r n rotors of n vehicles, in the world. All are drawn level.
 
     Args:
         shape: the shape of the vehicles.

@@ -124,7 +124,7 @@ class Viewer:
         self._bodies: list[Any] = []
         self._rotors: Any = None
         self._goals: Any = None
-        self._angle = np.zeros((count, 4))
+        self._angle = np.zeros((count, 1))
         self._trail: deque[tuple[np.ndarray, float]] = deque(maxlen=TRAIL_POINTS + 1)
         self._line: Any = None
         self._offset, self._placed = np.zeros(3), False
