@@ -415,7 +415,7 @@ class Env:
             wind = blown if wind is None else wind + blown
         if self.ground_effect is not None:
             more = air.cushion(air.propeller(physics.nominal), before.position[:, 2]) - 1
-            lifted = jnp.broadcast_to((1 + self.ground_effect * more)[:, None], (len(more), 4))
+            lifted = jnp.broadcast_to((1 + self.ground_effect * more)[:, None], before.rotor_speed.shape)
             share = lifted if share is None else share * lifted
         after = step(
             physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share, push=push
