@@ -71,8 +71,9 @@ def downwash(jet: Jet, state: State, agents: int) -> Float[Array, "n 3"]:
     away = pairs(state.position, agents)  # from the vehicle i that is blown at to the vehicle j that blows
     up = Quat.of(state.quaternion).z_axis()
     axis = tuple(part.reshape(-1, 1, agents) for part in (up.x, up.y, up.z))
-    along = sum(a * n for a, n in zip(away, axis, strict=True))
-    beside = sum(a * a for a in away) - along**2
+    (x, y, z), (nx, ny, nz) = away, axis
+    along = x * nx + y * ny + z * nz
+    beside = x * x + y * y + z * z - along**2
     blown = jet.velocity(along, jnp.maximum(beside, 0.0))
     return jnp.stack([-jnp.sum(blown * n, axis=-1).reshape(-1) for n in axis], axis=-1)
 

@@ -46,10 +46,9 @@ def approach(offset: tuple[Array, ...], motion: tuple[Array, ...]) -> Array:
         offset: x, y, z of the other's position minus the vehicle's, m.
         motion: x, y, z of its velocity minus the vehicle's, m/s.
     """
-    closing = -sum(p * v for p, v in zip(offset, motion, strict=True))
-    speed = sum(v * v for v in motion)
-    when = (closing / (speed + 1e-9)).clip(0.0, AHEAD)
-    return sum((p + when * v) ** 2 for p, v in zip(offset, motion, strict=True))
+    (x, y, z), (vx, vy, vz) = offset, motion
+    when = (-(x * vx + y * vy + z * vz) / (vx * vx + vy * vy + vz * vz + 1e-9)).clip(0.0, AHEAD)
+    return (x + when * vx) ** 2 + (y + when * vy) ** 2 + (z + when * vz) ** 2
 
 
 def nobody(n: int, count: int, like: Array) -> Others:

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +15,7 @@ from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks import company
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
+from e2efly.tasks.avoid_together import AvoidTogetherConfig
 from e2efly.tasks.task import Flier, struck
 
 
@@ -36,6 +38,8 @@ class AvoidTogetherWorld(AvoidWorld):
 @dataclass(frozen=True)
 class AvoidTogether(Avoid):
     """Starts beside each other in front of a random forest."""
+
+    config: AvoidTogetherConfig
 
     @property
     def agents(self) -> int:
@@ -61,14 +65,14 @@ class AvoidTogether(Avoid):
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
         return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no)
 
-    def scene(self, memory: AvoidTogetherWorld) -> Scene:
+    def scene(self, memory: Any) -> Scene:
         """The trees and the others on level ground."""
         others = company.spheres(memory.bodies, memory.time, self.shape.radius)
         return Scene.of({"cylinder": memory.trees, "sphere": others}, memory.speed.shape[0])
 
     def advance(
         self,
-        memory: AvoidTogetherWorld,
+        memory: Any,
         before: State,
         after: State,
         time: Float[jax.Array, " n"],

@@ -30,7 +30,7 @@ class SwapConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.swap.goal:SwapRoute"
     best: ClassVar = "bptt"
     shows_error: ClassVar = True
-    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=60, recurrent=64, hidden=(128, 64))}
+    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=30, recurrent=32, hidden=(128, 64))}
 
     agents: int = number(8, low=2, high=64, sets_shapes=True)
     """Number of vehicles in a world (sets shapes)."""
@@ -114,8 +114,11 @@ class SwapConfig(TaskConfig):
                 cls.training(), PPOConfig(), RewardConfig(weights, {"avoid_reach": 0.6}), network=network,
                 steps=20_000_000,
             )  # fmt: skip
-        weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "avoid": 10.0}
+        weights = {
+            "prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 15.0, "apart": 4.0,
+        }  # fmt: skip
         return TrainConfig(
-            cls.training(), BPTTConfig(horizon=96, average=0.99), RewardConfig(weights, {"avoid_reach": 0.5}),
+            cls.training(), BPTTConfig(envs=256, horizon=96, average=0.99),
+            RewardConfig(weights, {"avoid_reach": 0.6, "apart_reach": 0.5}),
             network=network, steps=8_000_000, chunk=30, eval_episodes=800,
         )  # fmt: skip
