@@ -281,7 +281,7 @@ def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> 
         from_json(content, "config.json")
 
 
-NOT_IN_THE_PAPER = ("hover_aware", "gap", "race_speed", "race_clutter_room")
+NOT_IN_THE_PAPER = ("hover_aware", "gap", "race_speed", "race_clutter_room", "dodge", "hall")
 BY_THE_PAPER = ("ppo", "bptt", "abpt")
 
 

@@ -158,7 +158,7 @@ class Scene:
 
         def still(s: Solids) -> Solids:
             zero, rate, always = jnp.zeros_like(s.centre), jnp.zeros_like(s.rate), jnp.full_like(s.since, -FAR)
-            moving = {name: zero for name in ("cosine", "sine", "velocity", "acceleration")}
+            moving = dict.fromkeys(("cosine", "sine", "velocity", "acceleration"), zero)
             there = {"centre": s.position(time), "active": s.present(time), "rate": rate, "since": always}
             return dataclasses.replace(s, **moving, **there)
 

@@ -22,7 +22,6 @@ from e2efly.config import (
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import ANGLE, LATEST, SPEED
 from e2efly.config.run import check_aloft
-from e2efly.courses import defaults
 from e2efly.tasks.registry import register
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -37,7 +36,7 @@ class DodgeConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.dodge.goal:DodgeRoute"
     best: ClassVar = "bptt"
     robust: ClassVar = {"bptt": Robust(steps=3_000_000, chunk=60, recurrent=96, hidden=(128, 64))}
-    cameras: ClassVar = (dataclasses.replace(AHEAD, width=48, height=32),)
+    cameras: ClassVar = (dataclasses.replace(AHEAD, width=48, height=32, encoding="log"),)
     variants: ClassVar = ("told",)
 
     episode_s: float = 7.5
@@ -135,9 +134,9 @@ class DodgeConfig(TaskConfig):
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
         """With gradients: through the distance at which each ball passes."""
-        weights = {"prog2": 1.0, "near": 1.0, "fit": 30.0, "ori1": 0.3, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.03}
+        weights = {"imitate": 1.0, "prog2": 1.0, "fit": 30.0, "v1": 0.05, "anglev_sq": 0.01, "act2_sq": 0.02}
         parameters = {"fit_margin": 0.25, "fit_limit": 0.6}
-        settings = BPTTConfig(horizon=64, learning_rate=8e-3, average=0.99) if algo != "ppo" else PPOConfig()
+        settings = BPTTConfig(horizon=48, learning_rate_end=2e-4, average=0.99) if algo != "ppo" else PPOConfig()
         if algo == "ppo":
             weights = {"near": 1.0, "ori1": 0.3, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 20.0}
             parameters = {}

@@ -2,14 +2,12 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from e2efly.control.place import Place
-from e2efly.control.vectors import Array, Vec3, namespace
+from e2efly.control.vectors import Array, namespace
 from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
@@ -93,19 +91,12 @@ class DodgeGoal(Goal):
     observation = (
         (Field("position_error", 3, "world", "m", 1.0, "the vehicle's place minus its position"), position_error),
         (
-            Field("thrower", 3, "world", "m", 4.0, "a point ahead, from about where balls may come, minus its position"),
+            Field("thrower", 3, "world", "m", 4.0, "a point ahead, about where balls come from, minus its position"),
             thrower,
         ),
         (Field("ball", 3, "world", "m", 4.0, "position of a ball in the air minus vehicle position, or 0"), ball),
         (Field("ball_velocity", 3, "world", "m/s", 8.0, "velocity of a ball in the air, or 0"), ball_velocity),
     )
-
-    @classmethod
-    def aim(cls, shown: Mapping[str, Array]) -> Place:
-        """The place, with the heading towards the thrower's sector."""
-        there = shown["thrower"] - shown["position_error"]
-        yaw = namespace(there).arctan2(there[..., 1], there[..., 0])
-        return Place(Vec3.of(shown["position_error"]), yaw=yaw)
 
     def advance(
         self, memory: DodgeMemory, before: Any, after: Any, time: Array, timed_out: Array

@@ -8,18 +8,20 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from e2efly.control.vectors import safe_sqrt
 from e2efly.policy.goal import Outcome
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene, Solids
 from e2efly.simulation.scenes.shapes import FAR
 from e2efly.tasks.dodge.goal import DodgeGoal, DodgeMemory
-from e2efly.tasks.task import at_rest, between, into_ball, struck, uniform
+from e2efly.tasks.dodge.pilot import passing, way_out
+from e2efly.tasks.task import Flier, at_rest, between, into_ball, struck, uniform
 from e2efly.vehicles.gravity import GRAVITY
 
 jax.tree_util.register_dataclass(DodgeMemory)
 
+REACTION, GONE = 0.1, 0.7
+"""The expert knows of a ball from the first to the second time after its throw, s. A policy cannot see it earlier."""
 COLOUR = (0.85, 0.25, 0.12)
 """Colour of the balls, RGB."""
 
@@ -85,6 +87,16 @@ class Dodge(DodgeGoal):
         )
         return Scene.of({"sphere": balls}, memory.yaw.shape[0])
 
+    def expert(self, memory: DodgeMemory, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+        """Velocity, m/s, and yaw, rad, of an expert that knows every ball in the air."""
+        age = flier.time[:, None] - memory.since
+        keep = jnp.where((age >= REACTION) & (age < GONE), memory.size + self.shape.radius, -1.0)
+
+        def balls(time: Float[Array, " n"]) -> tuple[Array, Array, Array]:
+            return (*self.flying(memory, time), keep)
+
+        return way_out(balls, flier, self.goal(memory, flier.time)), memory.yaw
+
     def drawn(self, memory: DodgeMemory) -> dict[str, Array]:
         """The throws: times, s, places, m, and velocities, m/s, of the release, and radii, m."""
         t, fall = memory.since[..., None], jnp.array([0.0, 0.0, -GRAVITY])
@@ -108,10 +120,7 @@ class Dodge(DodgeGoal):
         """
         balls = (self.flying(memory, t)[0] for t in (time - self.control_period, time))
         first, last = (at.position[:, None] - ball for at, ball in zip((before, after), balls, strict=True))
-        way = last - first
-        share = -jnp.sum(first * way, axis=-1) / jnp.maximum(jnp.sum(way**2, axis=-1), 1e-9)
-        nearest = first + jnp.clip(share, 0.0, 1.0)[..., None] * way
-        gap = safe_sqrt(jnp.sum(nearest**2, axis=-1)) - memory.size - self.shape.radius
+        gap = passing(first, last) - memory.size - self.shape.radius
         return jnp.where(time[:, None] > memory.since, gap, FAR)
 
     def advance(

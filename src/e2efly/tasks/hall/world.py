@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.generate import corridor
-from e2efly.simulation.scenes.scene import Scene, Solids, join
+from e2efly.simulation.scenes.scene import Scene, join
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
 
 BEYOND = 10.0

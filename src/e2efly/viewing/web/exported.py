@@ -132,9 +132,7 @@ def _seen(env: Env, task: TaskConfig, state: EnvState) -> dict[str, Any]:
         path = np.asarray(jax.vmap(lambda time: env.task.goal(state.memory, time[None])[0])(times))
         lines += [path] if np.ptp(path, axis=0).max() > 0.01 else []
     return {
-        "solids": [
-            _solid(body, float(env.task.episode_s)) for body in shown.bodies
-        ],
+        "solids": [_solid(body, float(env.task.episode_s)) for body in shown.bodies],
         "lines": [plain(points) for points in lines],
         "faces": [plain(x.points) for x in shown.things if isinstance(x, Face)],
         "marks": [{"point": plain(x.point), "text": x.text} for x in shown.things if isinstance(x, Mark) and x.text],
