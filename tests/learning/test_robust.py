@@ -48,7 +48,8 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     said = " ".join(capsys.readouterr().err.split())
     assert (
         "preset 'robust': accepted for avoid by bptt, dodge by bptt, gap by bptt, hall by bptt, "
-        "hover by bptt or ppo, hover_aware by bptt, land by bptt, land_visual by bptt, race by bptt, race_clutter by bptt, race_clutter_room by bptt, "
+        "hover by bptt or ppo, hover_aware by bptt, land by bptt, "
+        "land_visual by bptt, race by bptt, race_clutter by bptt, race_clutter_room by bptt, "
         "race_speed by bptt, track by bptt or ppo" in said
     )
     assert f"not for {task} by {algo}" in said

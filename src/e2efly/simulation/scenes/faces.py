@@ -115,10 +115,8 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
             moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
             path = way[1:] if moves else None
-            begins, lands = (
-                float(since[i]),
-                _landing(centre[i], velocity[i], acceleration[i], float(scene.ground[world])),
-            )
+            begins, ground = float(since[i]), float(scene.ground[world])
+            lands = _landing(centre[i], velocity[i], acceleration[i], ground)
             then = float(np.clip(time, max(begins, 0.0), lands))
             at = way[0] + then * (velocity[i] + then / 2 * acceleration[i])
             found.append(
