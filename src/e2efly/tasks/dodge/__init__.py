@@ -35,7 +35,7 @@ class DodgeConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.dodge.goal:DodgeGoal"
     route: ClassVar[str] = "e2efly.tasks.dodge.goal:DodgeRoute"
     best: ClassVar = "bptt"
-    robust: ClassVar = {"bptt": Robust(steps=3_000_000, chunk=60, recurrent=96, hidden=(128, 64))}
+    robust: ClassVar = {"bptt": Robust(steps=4_400_000, chunk=60, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (dataclasses.replace(AHEAD, width=48, height=32, encoding="log"),)
     variants: ClassVar = ("told",)
 
@@ -133,8 +133,8 @@ class DodgeConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """With gradients: through the distance at which each ball passes."""
-        weights = {"imitate": 1.0, "prog2": 1.0, "fit": 30.0, "v1": 0.05, "anglev_sq": 0.01, "act2_sq": 0.02}
+        """With gradients: imitate an expert that knows each ball, and let the balls pass at a distance."""
+        weights = {"imitate": 1.0, "prog2": 1.5, "fit": 40.0, "v1": 0.05, "anglev_sq": 0.01, "act2_sq": 0.02}
         parameters = {"fit_margin": 0.25, "fit_limit": 0.6}
         settings = BPTTConfig(horizon=48, learning_rate_end=2e-4, average=0.99) if algo != "ppo" else PPOConfig()
         if algo == "ppo":
