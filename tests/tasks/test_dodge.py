@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.config import BPTTConfig
-from e2efly.environment import random_key
+from e2efly.config import BPTTConfig, EnvConfig, RewardConfig
+from e2efly.environment import Env, EnvState, random_key
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import gaps
 from e2efly.tasks.dodge import DodgeConfig
 from e2efly.tasks.dodge.goal import DodgeMemory, DodgeRoute
-from e2efly.tasks.dodge.world import Dodge, launch
-from e2efly.tasks.task import Shape, at_rest
+from e2efly.tasks.dodge.pilot import BACK, HASTE, HOMING
+from e2efly.tasks.dodge.world import REACTION, Dodge, launch
+from e2efly.tasks.task import Flier, Shape, at_rest
 from e2efly.vehicles.gravity import GRAVITY
 
 SHAPE = Shape(0.05, 0.12)
@@ -196,6 +197,34 @@ def test_the_passing_distance_is_that_of_many_points_of_the_step() -> None:
     assert (found < 0).mean() > 0.1
 
 
+def test_the_expert_comes_back_and_goes_across_the_way_of_a_ball() -> None:
+    task, memory = make(), one((4.0, 0.0, 2.0), (-7.6, 0.0, 2.45), since=1.0)
+    for time, position in ((1.0 + 0.9 * REACTION, (0.0, 0.2, 2.0)), (2.0, (0.0, 0.2, 2.0)), (1.2, (0.0, 0.9, 2.0))):
+        flier = Flier.usual(jnp.array([position]), jnp.zeros((1, 3)), time)
+        velocity, yaw = task.expert(memory, flier)
+        np.testing.assert_allclose(velocity, [[0.0, -min(BACK * position[1], HOMING), 0.0]], atol=1e-4)
+        np.testing.assert_array_equal(yaw, memory.yaw)
+    flier = Flier.usual(jnp.array([[0.0, 0.02, 2.0]]), jnp.zeros((1, 3)), 1.0 + 1.1 * REACTION)
+    (velocity,), _ = task.expert(memory, flier)
+    flying = task.flying(memory, jnp.full(1, 1.0 + 1.1 * REACTION))[1][0, 0]
+    assert float(jnp.linalg.norm(velocity)) == pytest.approx(HASTE, rel=1e-3)
+    assert abs(float(velocity @ flying)) < 0.05 * HASTE * 8.0
+
+
+def test_the_expert_is_not_struck_in_the_simulator() -> None:
+    """And who hovers is: the same throws, the vehicle of the file."""
+    config = e2efly.preset("dodge", "bptt", "nominal")
+    env = Env.of(config.task, RewardConfig({"imitate": 1.0}), EnvConfig())
+    state, _ = jax.jit(env.reset, static_argnums=1)(random_key(5), 64)
+
+    def fly(state: EnvState, _: None) -> tuple[EnvState, jax.Array]:
+        after, out = env.step(state, env.expert_action(state), restart=False)
+        return after, out.success
+
+    _, success = jax.jit(lambda s: jax.lax.scan(fly, s, None, length=env.episode_steps))(state)
+    assert float(jnp.mean(success[-1])) > 0.9
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -224,6 +253,7 @@ def test_in_flight_it_hovers_and_looks_where_balls_may_come_from() -> None:
     assert not outcome.crashed[0]
 
 
+@pytest.mark.whole
 def test_a_short_training_improves(tmp_path: Any) -> None:
     """Told of the ball, with the vehicle of the file. Untrained, it is struck."""
     summary = e2efly.train(
