@@ -34,6 +34,8 @@ from tests.conftest import QUICK, NetworkTrace
 USUALLY = {"xla_backend_optimization_level": 3}
 """XLA's own, instead of `QUICK`: images take longer to draw than their program takes to compile."""
 POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
+LATER = {"hall"}
+"""Tasks of which no policy is good enough yet."""
 
 
 @pytest.mark.whole(but=1)
@@ -105,11 +107,11 @@ def test_robust_policies_fly_vehicles_that_are_not_theirs() -> None:
 
 
 def test_it_has_every_task_for_the_usual_vehicle_and_none_is_large() -> None:
-    assert set(contents()[USUAL]) == {*TASKS, "race_any"}
+    assert set(contents()[USUAL]) == {*TASKS, "race_any"} - LATER
     assert set(contents()) == {*vehicle_names(), *family_names()}
     for task in ("hover", "land", "track", "race", "race_speed"):  # by poses alone: every vehicle has them
         assert all(task in tasks for tasks in contents().values())
-    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == {*TASKS, "race_any", "hover_rotors"}
+    assert {file.stem for file in FOLDER.glob("*/*.onnx")} == {*TASKS, "race_any", "hover_rotors"} - LATER
     assert max(file.stat().st_size for file in FOLDER.glob("*/*.onnx")) < 1_000_000
 
 
