@@ -36,6 +36,7 @@ class HallConfig(AvoidConfig):
     """Fly through a cluttered hall, seen only by a LiDAR."""
 
     world: ClassVar[str] = "e2efly.tasks.hall.world:Hall"
+    goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
     route: ClassVar[str] = "e2efly.tasks.hall.goal:HallRoute"
     robust: ClassVar = {"bptt": Robust(steps=2_000_000, chunk=60, recurrent=64, hidden=(128, 64))}
     cameras: ClassVar = (LIDAR,)
