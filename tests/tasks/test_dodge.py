@@ -1,6 +1,7 @@
 """Dodging balls: the throws, what they hit, and the distance at which they pass."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -11,6 +12,7 @@ import pytest
 import e2efly
 from e2efly.config import BPTTConfig, EnvConfig, RewardConfig
 from e2efly.environment import Env, EnvState, random_key
+from e2efly.runs.rundir import RunDirectory
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import gaps
 from e2efly.tasks.dodge import DodgeConfig
@@ -24,7 +26,7 @@ SHAPE = Shape(0.05, 0.12)
 PERIOD, CHECKS = 1 / 30, 7
 LATER, NOW = jnp.zeros(1, bool), jnp.ones(1, bool)
 N = 2000
-SHORT = BPTTConfig(horizon=64, learning_rate=1e-2, learning_rate_end=1e-3, average=0.9)
+SHORT = BPTTConfig(envs=32, horizon=48, learning_rate=6e-3, learning_rate_end=1e-3, average=0.9)
 
 
 def make(**changes: Any) -> Dodge:
@@ -254,10 +256,13 @@ def test_in_flight_it_hovers_and_looks_where_balls_may_come_from() -> None:
 
 
 @pytest.mark.whole
-def test_a_short_training_improves(tmp_path: Any) -> None:
-    """Told of the ball, with the vehicle of the file. Untrained, it is struck."""
-    summary = e2efly.train(
-        "dodge", "bptt", preset_name="told", out=tmp_path / "run", options=SHORT, steps=150_000, chunk=36,
-        eval_episodes=100,
+def test_a_short_training_improves(tmp_path: Path) -> None:
+    """Told of the ball, with the vehicle of the file: it comes nearer to the expert."""
+    e2efly.train(
+        "dodge", "bptt", preset_name="told", out=tmp_path / "run", options=SHORT, steps=245_760, chunk=40,
+        eval_episodes=20,
     )  # fmt: skip
-    assert summary["shipped"]["dodge"]["success"] > 0.4
+    rows = RunDirectory(tmp_path / "run").rows()
+    first, last = (np.mean([row["reward/imitate"] for row in part]) for part in (rows[8:24], rows[-16:]))
+    assert first < 0
+    assert last > 0.6 * first
