@@ -63,7 +63,7 @@ from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors")}
 """Policies of a task by a preset of its own: task and preset."""
-ALONE = {"race_any": USUAL, "race_clutter_room": USUAL, "hover_rotors": presets.FAMILY}
+ALONE = {"race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_rotors": presets.FAMILY}
 """For this vehicle alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""

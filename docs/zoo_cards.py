@@ -31,8 +31,10 @@ TASKS = {
     "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "gap": "Fly through a narrow tilted slit, banked.",
     "hover_aware": "Fly to a point and keep a moving ball in view.",
+    "dodge": "Hover, and dodge balls that are thrown at 8 m/s, which only a depth camera shows.",
     "land_visual": "Land on a pad that only a camera shows.",
     "avoid": "Fly fast through a forest that only a depth camera shows.",
+    "hall": "Fly through a cluttered hall that only a LiDAR shows.",
     "race_clutter": "Race among obstacles that only a depth camera shows.",
     "race_clutter_room": "The same in a room of 6x6 m, at the speed of a room ([a small room](hil.md#a-small-room)).",
 }

@@ -61,6 +61,12 @@ def test_starts_are_where_the_task_says(name: str) -> None:
         assert 1.48 < np.abs(offset).max() <= 1.5
         assert 0.49 < speed.max() <= 0.5
         assert 0.25 < np.abs(angles[:, 1:]).max() <= np.pi / 12 + 1e-5
+    if name == "dodge":
+        assert 0.198 < np.abs(offset).max() <= 0.2 + 1e-6
+        assert 0.198 < speed.max() <= 0.2
+    if name == "hall":
+        assert 1.97 < np.abs(v.position[:, 1]).max() <= 2.0
+        np.testing.assert_array_equal(v.position[:, 0], 0.0)
     if name == "gap":
         assert -4.0 - 1e-6 <= offset[:, 0].min() < -3.97
         assert -2.53 < offset[:, 0].max() <= -2.5 + 1e-6

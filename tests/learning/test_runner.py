@@ -281,7 +281,9 @@ def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> 
         from_json(content, "config.json")
 
 
-NOT_IN_THE_PAPER = ("hover_aware", "gap", "race_speed", "race_clutter_room", "swap")
+NOT_IN_THE_PAPER = (
+    "hover_aware", "gap", "race_speed", "race_clutter_room", "dodge", "hall", "swap", "avoid_together",
+)  # fmt: skip
 BY_THE_PAPER = ("ppo", "bptt", "abpt")
 
 

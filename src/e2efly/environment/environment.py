@@ -547,7 +547,7 @@ class Env:
         motion = expert.ahead(flown, state.vehicle, queue, state.action_latency, self.control_period)
         largest = jnp.minimum((self.center + self.half)[0], vehicle.lift * physics.mixer.thrust_max / vehicle.mass)
         pilot = expert.pilot(flown, largest * effect.thrust)
-        velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion))
+        velocity, yaw = self.task.expert(state.memory, expert.flier(pilot, motion, state.time + state.action_latency))
         command = effect.needed(expert.command(pilot, motion, velocity, yaw))
         return jnp.clip((command - self.center) / self.half, -1.0, 1.0)
 

@@ -135,13 +135,14 @@ def pilot(vehicle: Vehicle, largest: Float[Array, " n"]) -> Vehicle:
     )
 
 
-def flier(pilot: Vehicle, motion: ExpertMotion) -> Flier:
-    """What a task's expert knows of the motion."""
+def flier(pilot: Vehicle, motion: ExpertMotion, time: Float[Array, " n"]) -> Flier:
+    """What a task's expert knows of the motion at a time in the episode, s."""
     position, up = motion.position.stack(), motion.attitude.z_axis()
     per = GRAVITY / jnp.maximum(up.z, UPRIGHT)
     most = jnp.minimum(pilot.acceleration_max[..., 0], AGILE)
     lag = jnp.broadcast_to(FOLLOWS / pilot.attitude_gain[..., 0], most.shape)
-    return Flier(position, motion.velocity.stack(), jnp.stack([per * up.x, per * up.y], axis=-1), most, lag)
+    level = jnp.stack([per * up.x, per * up.y], axis=-1)
+    return Flier(position, motion.velocity.stack(), level, most, lag, time)
 
 
 def command(

@@ -91,12 +91,16 @@ class Flier:
     """Largest level acceleration, m/s^2."""
     lag: Float[Array, " n"]
     """Lag of the acceleration behind the commanded one, s."""
+    time: Float[Array, " n"]
+    """Time in the episode at which it moves so, s."""
 
     @staticmethod
-    def usual(position: Float[Array, "n 3"], velocity: Float[Array, "n 3"]) -> "Flier":
+    def usual(position: Float[Array, "n 3"], velocity: Float[Array, "n 3"], time: float | Array = 0.0) -> "Flier":
         """A vehicle of usual agility, whose attitude is level."""
         n = position.shape[0]
-        return Flier(position, velocity, jnp.zeros((n, 2)), jnp.full(n, AGILE), jnp.full(n, LAG))
+        return Flier(
+            position, velocity, jnp.zeros((n, 2)), jnp.full(n, AGILE), jnp.full(n, LAG), jnp.broadcast_to(time, (n,))
+        )
 
 
 @runtime_checkable

@@ -116,7 +116,7 @@ def beside(world: World, task: Scene) -> World:
         }
         return dataclasses.replace(world, solids=both)
     for kind, solids in task.solids.items():
-        if np.any(np.asarray(solids.active) & (np.asarray(solids.rate) != 0)):
+        if np.any(np.asarray(solids.moves)):
             raise ValueError(
                 f"the task's world has a {kind} that moves; accepted: a scene of solids (.toml), or a task without"
             )

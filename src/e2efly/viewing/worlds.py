@@ -39,7 +39,7 @@ def draw_plan(ax: Axes, things: Sequence[FacesBody]) -> None:
     outlines = [body.outline for body in things]
     faces = [_pale(body.colour, 0.35) for body in things]
     ax.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=GREY, linewidths=0.6, zorder=1.6))
-    ways = [body.path[:, :2] for body in things if body.path is not None]
+    ways = [body.way[:, :2] for body in things if body.way is not None]
     ax.add_collection(LineCollection(ways, colors=GREY, linewidths=0.8, linestyles=":", zorder=1.7))
 
 
@@ -49,8 +49,8 @@ def draw_space(ax: Any, things: Sequence[FacesBody]) -> None:
         faces = Poly3DCollection(list(body.quads), facecolors=[_pale(body.colour, 0.3)], shade=True, zorder=1.6)
         faces.set_alpha(0.35)
         ax.add_collection3d(faces, autolim=False)
-        if body.path is not None:
-            way = Line3DCollection([body.path], colors=GREY, linewidths=0.8, linestyles=":", zorder=1.7)
+        if body.way is not None:
+            way = Line3DCollection([body.way], colors=GREY, linewidths=0.8, linestyles=":", zorder=1.7)
             ax.add_collection3d(way, autolim=False)
 
 

@@ -88,9 +88,33 @@ class TestMoving:
         where = [4.0 - 8.0 * 0.5, 0.0, 2.0 + 3.0 * 0.5 - 9.81 * 0.5**2 / 2]
         np.testing.assert_allclose(scene.solids["sphere"].position(late)[0, 0], where, atol=1e-6)
         np.testing.assert_allclose(scene.at(late).solids["sphere"].position(NOW)[0, 0], where, atol=1e-6)
-        (body,) = bodies(scene, time=0.5)
-        np.testing.assert_allclose(body.quads.reshape(-1, 3).mean(0), where, atol=0.05)
+        (then,), (body,) = bodies(scene, time=0.5), bodies(scene)
+        np.testing.assert_allclose(then.quads.reshape(-1, 3).mean(0), where, atol=0.05)
         np.testing.assert_allclose(body.moved(0.5), np.subtract(where, [4.0, 0.0, 2.0]), atol=1e-6)
+        np.testing.assert_allclose(then.moved(0.5), 0.0, atol=1e-6)
+
+    def test_what_is_thrown_is_there_from_its_throw_until_it_is_under_the_ground(self) -> None:
+        thrown = dataclasses.replace(
+            ball((12.0, 0.0, -0.405)),
+            velocity=jnp.asarray([[[-8.0, 0.0, 9.81]]]),
+            acceleration=jnp.asarray([[[0, 0, -9.81]]]),
+            since=jnp.ones((1, 1)),
+        )  # at rest in height after 1 s, 4.5 m high
+        scene = Scene.of({"sphere": thrown}, 1)
+        for time, there in ((0.9, False), (1.1, True)):
+            place = thrown.position(jnp.full(1, time))[:, 0]
+            assert (float(clearance(scene, place, jnp.full(1, time))[0]) < 0) == there
+            assert bool(scene.at(jnp.full(1, time)).solids["sphere"].active[0, 0]) == there
+        (body,) = bodies(scene)
+        lands = 1.0 + math.sqrt(2 * 4.5 / 9.81)
+        assert body.moves
+        assert [body.visible(t) for t in (0.99, 1.01, lands - 0.01, lands + 0.01)] == [False, True, True, False]
+        np.testing.assert_allclose(body.quads.reshape(-1, 3).mean(0), [4.0, 0.0, 4.5], atol=0.05)  # where it is thrown
+        np.testing.assert_allclose(body.moved(1.5), [-4.0, 0.0, -9.81 / 8], atol=1e-4)
+        assert body.way is not None
+        np.testing.assert_allclose(body.way[[0, -1], 0], [4.0, 4.0 - 8 * (lands - 1)], atol=0.05)
+        assert bool(thrown.moves[0, 0])
+        assert not bodies(Scene.of({"sphere": ball((4.0, 0.0, 2.0))}, 1))[0].moves
 
 
 class TestGenerators:

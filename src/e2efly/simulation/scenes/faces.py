@@ -14,6 +14,8 @@ Quads = Float[np.ndarray, "f 4 3"]
 
 _SIDES = 20
 """Number of sides with which a circle is drawn."""
+_SHOWN = 2.0
+"""Longest part of the way of what is thrown that is drawn, s."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,41 @@ class FacesBody:
     """Velocity at time 0, beside the path, world, m/s."""
     acceleration: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
     """Acceleration beside the path, world, m/s^2."""
+    since: float = -np.inf
+    """Time before which it is not present, s."""
+    until: float = np.inf
+    """Time after which what is thrown is under the ground, s."""
+    drawn: float = 0.0
+    """Time at which what is thrown has these faces, s."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves, or comes only later."""
+        return self.path is not None or self.since > 0 or self._is_thrown
+
+    @property
+    def _is_thrown(self) -> bool:
+        return bool(np.any([self.velocity, self.acceleration]))
+
+    def visible(self, time: float) -> bool:
+        """Whether it is present and over the ground at a time, s."""
+        return self.since <= time <= self.until
+
+    @property
+    def way(self) -> Float[np.ndarray, "m 3"] | None:
+        """The way of its centre, world, m: its path, or where it is thrown. None: it does not move."""
+        if self.path is not None or not self._is_thrown:
+            return self.path
+        first = max(self.since, 0.0)
+        times = np.linspace(first, min(self.until, first + _SHOWN), 33)
+        return self.quads.reshape(-1, 3).mean(axis=0) + np.array([self.moved(time) for time in times])
+
+    def _thrown(self, time: float) -> Float[np.ndarray, "3"]:
+        return time * (self.velocity + time / 2 * self.acceleration)
 
     def moved(self, time: float) -> Float[np.ndarray, "3"]:
-        """Displacement since time 0, m, at a time, s."""
-        thrown = time * (self.velocity + time / 2 * self.acceleration)
+        """Displacement since time 0 (of what is thrown: since `drawn`), m, at a time, s."""
+        thrown = self._thrown(time) - self._thrown(self.drawn)
         if self.path is None:
             return thrown
         quarter, half = len(self.path) // 4, len(self.path) // 2
@@ -60,16 +93,17 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
     Args:
         scene: the worlds.
         world: index of the world.
-        time: time at which moving solids are drawn, s.
+        time: time at which moving solids are drawn, s. What is thrown is drawn where it begins, if this is earlier,
+            and where it lands, if this is later.
         ceilings: whether to include horizontal walls, which hide everything from above.
     """
     found = []
     for kind in scene.kinds:
         s = scene.solids[kind]
         turned = np.asarray(to_matrix(s.quaternion[world]), float)
-        centre, cosine, sine, rate, size, colour, velocity, acceleration = (
+        centre, cosine, sine, rate, size, colour, velocity, acceleration, since = (
             np.asarray(x[world], float)
-            for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour, s.velocity, s.acceleration)
+            for x in (s.centre, s.cosine, s.sine, s.rate, s.size, s.colour, s.velocity, s.acceleration, s.since)
         )
         label = np.asarray(s.label[world])
         for i in np.flatnonzero(np.asarray(s.active[world]) & (label != VEHICLE)):
@@ -81,10 +115,25 @@ def bodies(scene: Scene, world: int = 0, time: float = 0.0, ceilings: bool = Fal
             way = centre[i] + cosine[i] * np.cos(angle) + sine[i] * np.sin(angle)
             moves = rate[i] != 0 and bool(np.ptp(way, axis=0).any())
             path = way[1:] if moves else None
-            at = way[0] + time * (velocity[i] + time / 2 * acceleration[i])
-            kind_of = CLASSES[label[i]]
-            found.append(FacesBody(quads + at, colour[i], path, float(rate[i]), kind_of, velocity[i], acceleration[i]))
+            begins, ground = float(since[i]), float(scene.ground[world])
+            lands = _landing(centre[i], velocity[i], acceleration[i], ground)
+            then = float(np.clip(time, max(begins, 0.0), lands))
+            at = way[0] + then * (velocity[i] + then / 2 * acceleration[i])
+            found.append(
+                FacesBody(
+                    quads + at, colour[i], path, float(rate[i]), CLASSES[label[i]], velocity[i], acceleration[i],
+                    begins, lands, then,
+                )
+            )  # fmt: skip
     return found
+
+
+def _landing(centre: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, ground: float) -> float:
+    """Time at which the centre of what falls comes to the ground, s. Infinite if it does not fall."""
+    height, up, fall = centre[2] - ground, velocity[2], -acceleration[2]
+    if fall <= 0:
+        return np.inf
+    return float(up + np.sqrt(max(up**2 + 2 * fall * height, 0.0))) / fall
 
 
 def _quads(kind: str, size: np.ndarray) -> Quads:

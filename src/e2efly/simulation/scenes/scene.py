@@ -60,6 +60,8 @@ class Solids:
     """Velocity of the path at time 0, world, m/s: what is thrown."""
     acceleration: Float[Array, "n k 3"]
     """Acceleration of the path, world, m/s^2."""
+    since: Float[Array, "n k"]
+    """Time before which the solid is not present, s."""
 
     @staticmethod
     def of(
@@ -102,6 +104,7 @@ class Solids:
             rate=jnp.zeros((n, k), jnp.float32),
             velocity=zero,
             acceleration=zero,
+            since=jnp.full((n, k), -FAR, jnp.float32),
         )
 
     @property
@@ -114,6 +117,16 @@ class Solids:
         t, angle = time[:, None, None], (self.rate * time[:, None])[..., None]
         turned = self.centre + self.cosine * jnp.cos(angle) + self.sine * jnp.sin(angle)
         return turned + t * (self.velocity + t / 2 * self.acceleration)
+
+    def present(self, time: Float[Array, " n"]) -> Bool[Array, "n k"]:
+        """Which solids are present at a time."""
+        return self.active & (time[:, None] >= self.since)
+
+    @property
+    def moves(self) -> Bool[Array, "n k"]:
+        """Which solids move."""
+        thrown = jnp.any((self.velocity != 0) | (self.acceleration != 0), axis=-1)
+        return self.active & ((self.rate != 0) | thrown)
 
 
 @jax.tree_util.register_dataclass
@@ -145,12 +158,10 @@ class Scene:
         """The worlds at `time`, s, standing still."""
 
         def still(s: Solids) -> Solids:
-            moving = (s.cosine, s.sine, s.rate, s.velocity, s.acceleration)
-            cosine, sine, rate, velocity, acceleration = map(jnp.zeros_like, moving)
-            return Solids(
-                s.position(time), s.quaternion, s.size, s.active, s.label, s.colour, cosine, sine, rate, velocity,
-                acceleration,
-            )  # fmt: skip
+            zero, rate, always = jnp.zeros_like(s.centre), jnp.zeros_like(s.rate), jnp.full_like(s.since, -FAR)
+            moving = dict.fromkeys(("cosine", "sine", "velocity", "acceleration"), zero)
+            there = {"centre": s.position(time), "active": s.present(time), "rate": rate, "since": always}
+            return dataclasses.replace(s, **moving, **there)
 
         return dataclasses.replace(self, solids={kind: still(s) for kind, s in self.solids.items()})
 
@@ -179,4 +190,4 @@ def distances(
 ) -> Float[Array, "n k"]:
     """Signed distance of a point in each world to each solid, m. `FAR` for solids that are not present."""
     local = unrotate(solids.quaternion, position[:, None] - solids.position(time))
-    return jnp.where(solids.active, SHAPES[kind].distance(solids.size, local), FAR)
+    return jnp.where(solids.present(time), SHAPES[kind].distance(solids.size, local), FAR)

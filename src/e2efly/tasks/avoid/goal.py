@@ -100,6 +100,8 @@ class AvoidRoute(Route):
     """How fast to fly through the lane, which begins at the origin."""
 
     longest_s: ClassVar = 20.0
+    options: ClassVar[type[AvoidConfig]] = AvoidConfig
+    """The task that the lane is of."""
 
     speed: float = number(5.0, above=0, high=SPEED)
     """Commanded speed, m/s."""
@@ -115,7 +117,7 @@ class AvoidRoute(Route):
 
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course along the lane, with the heading of the lane."""
-        config = AvoidConfig()
+        config = self.options()
         goal, start = AvoidGoal(config, shape, control_period, 1), np.array([0.0, 0.0, config.altitude])
         return Course(
             goal,

@@ -300,7 +300,7 @@ def film(
 
 def _standing(stage: Stage) -> Soup:
     """Everything that stands still."""
-    meshes = [mesh_of(body.quads, body.colour) for body in stage.bodies if body.path is None]
+    meshes = [mesh_of(body.quads, body.colour) for body in stage.bodies if not body.moves]
     for thing in stage.things:
         if isinstance(thing, Face):
             meshes.append(face(thing))
@@ -311,7 +311,9 @@ def _standing(stage: Stage) -> Soup:
 
 def _moving(stage: Stage, time: float, origin: np.ndarray) -> Soup:
     return Soup.of(
-        mesh_of(body.quads + body.moved(time) + origin, body.colour) for body in stage.bodies if body.path is not None
+        mesh_of(body.quads + body.moved(time) + origin, body.colour)
+        for body in stage.bodies
+        if body.moves and body.visible(time)
     )
 
 

@@ -144,6 +144,7 @@ class Viewer:
             self._root.position = tuple(map(float, origin))
             for body, node in self._moving:
                 node.position = tuple(map(float, body.moved(frame.time)))
+                node.visible = body.visible(frame.time)
             self._look(frame)
             self._fly(frame, elapsed)
             self._draw_trail(frame)
@@ -164,7 +165,7 @@ class Viewer:
         self._moving = []
         still: dict[tuple[float, ...], list[np.ndarray]] = {}
         for i, body in enumerate(stage.bodies):
-            if body.path is None:
+            if not body.moves:
                 still.setdefault(tuple(body.colour.tolist()), []).append(body.quads)
             else:
                 self._moving.append(

@@ -13,6 +13,7 @@ from e2efly.config import TaskConfig
 from e2efly.config.drawing import Face, Line, Mark
 from e2efly.environment import UNSEEN, Env, EnvState, random_key
 from e2efly.simulation.device import fast_compile
+from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.validation.evaluation import SEED
 from e2efly.viewing.watch.simulation import LATEST, Hands, held, stage, under
 from e2efly.viewing.watch.stage import Stage
@@ -22,7 +23,9 @@ from e2efly.viewing.web.machine import packed
 STARTS = 12
 """Number of starts of each course."""
 POINTS = 241
-"""Number of points of the drawn path of a goal."""
+"""Number of points of the drawn path of a goal, and of what is thrown."""
+UNDER = 1e3
+"""Depth under its place at which something that is not visible is kept, m."""
 NOISY = ("gyro_noise", "accel_noise", "gyro_bias", "accel_bias")
 """Options of an IMU that make it noisy."""
 HANDS = tuple(f.name for f in dataclasses.fields(Hands))
@@ -132,15 +135,25 @@ def _seen(env: Env, task: TaskConfig, state: EnvState) -> dict[str, Any]:
         path = np.asarray(jax.vmap(lambda time: env.task.goal(state.memory, time[None])[0])(times))
         lines += [path] if np.ptp(path, axis=0).max() > 0.01 else []
     return {
-        "solids": [
-            {"quads": packed(body.quads), "colour": plain(body.colour), "label": body.label}
-            | ({} if body.path is None else {"path": plain(body.path), "rate": body.rate})
-            for body in shown.bodies
-        ],
+        "solids": [_solid(body, float(env.task.episode_s)) for body in shown.bodies],
         "lines": [plain(points) for points in lines],
         "faces": [plain(x.points) for x in shown.things if isinstance(x, Face)],
         "marks": [{"point": plain(x.point), "text": x.text} for x in shown.things if isinstance(x, Mark) and x.text],
     }
+
+
+def _solid(body: FacesBody, episode_s: float) -> dict[str, Any]:
+    """A solid as JSON. It may move along a path, relative to whose first point its faces are.
+
+    One round of what is thrown takes an episode, s. While it is not visible, it is under the ground.
+    """
+    drawn = {"colour": plain(body.colour), "label": body.label}
+    if not body.moves or body.path is not None:
+        moving = {} if body.path is None else {"path": plain(body.path), "rate": body.rate}
+        return {"quads": packed(body.quads), **drawn, **moving}
+    times = np.linspace(0.0, episode_s, POINTS)
+    path = np.array([body.moved(t) + (0.0 if body.visible(t) else np.array([0.0, 0.0, -UNDER])) for t in times])
+    return {"quads": packed(body.quads + path[0]), **drawn, "path": plain(path), "rate": 2 * np.pi / episode_s}
 
 
 def plain(value: Any) -> Any:

@@ -1,0 +1,75 @@
+"""Options and recipes: fly through a cluttered hall, seen only by a LiDAR."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from e2efly.config import (
+    BPTTConfig,
+    CameraConfig,
+    EnvConfig,
+    ForestConfig,
+    ImageNoiseConfig,
+    NetworkConfig,
+    PPOConfig,
+    RewardConfig,
+    Robust,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
+from e2efly.config.numbers import SPEED
+from e2efly.tasks.avoid import AvoidConfig
+from e2efly.tasks.registry import register
+
+LIDAR = CameraConfig(
+    "range", width=64, height=4, projection="spherical", fov=(2 * math.pi, math.radians(30)), reach=(0.1, 12.0),
+    noise=ImageNoiseConfig(gaussian=0.0015),
+)  # fmt: skip
+"""A small LiDAR: four rings of 64 rays all around, with an error of 2 cm."""
+
+
+@register("hall")
+@dataclass(frozen=True)
+class HallConfig(AvoidConfig):
+    """Fly through a cluttered hall, seen only by a LiDAR."""
+
+    world: ClassVar[str] = "e2efly.tasks.hall.world:Hall"
+    goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
+    route: ClassVar[str] = "e2efly.tasks.hall.goal:HallRoute"
+    robust: ClassVar = {"bptt": Robust(steps=2_000_000, chunk=60, recurrent=64, hidden=(128, 64))}
+    cameras: ClassVar = (LIDAR,)
+    curriculum: ClassVar = ()
+    paper: ClassVar = None
+
+    forest: ForestConfig = ForestConfig(
+        density=0.15, length=30.0, width=8.0, radius=(0.15, 0.4), height=(3.0, 3.0), clear=1.5, room=48
+    )
+    """The pillars and crates, from the floor to the ceiling, and the hall's length and width."""
+    crates: float = number(0.5, high=1.0)
+    """Share of the obstacles that are crates: square, turned by any angle. The others are round pillars. The radius is
+    that of the circle around it."""
+    speed: tuple[float, float] = number((2.0, 4.5), high=SPEED, rising=True)
+    sideways: float = 2.0
+
+    def criteria(self) -> dict[str, TaskConfig]:
+        """Two speeds. Collisions end the episode."""
+        return {
+            f"{self.name}_{speed:g}": dataclasses.replace(self, speed=(speed, speed), collisions_end=True)
+            for speed in (2.5, 4.0)
+        }
+
+    @classmethod
+    def recipe(cls, algo: str) -> TrainConfig:
+        """As for the forest: imitate an expert that knows the hall, and keep away from what stands in it."""
+        config = super().recipe(algo)
+        weights, network = config.reward.weights, NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
+        settings = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
+        if algo == "ppo":
+            network, settings = dataclasses.replace(network, recurrent=0), PPOConfig(learning_rate=2e-3, gamma=0.98)
+        return dataclasses.replace(
+            config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network,
+            reward=RewardConfig(dict(weights), config.reward.parameters), env=EnvConfig(cameras=cls.cameras),
+            curriculum=(), steps=2_000_000, chunk=60,
+        )  # fmt: skip
