@@ -114,11 +114,9 @@ class SwapConfig(TaskConfig):
                 cls.training(), PPOConfig(), RewardConfig(weights, {"avoid_reach": 0.6}), network=network,
                 steps=20_000_000,
             )  # fmt: skip
-        weights = {
-            "prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 15.0, "apart": 4.0,
-        }  # fmt: skip
+        weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 20.0}
         return TrainConfig(
             cls.training(), BPTTConfig(envs=256, horizon=96, average=0.99),
-            RewardConfig(weights, {"avoid_reach": 0.6, "apart_reach": 0.5}),
-            network=network, steps=8_000_000, chunk=30, eval_episodes=800,
+            RewardConfig(weights, {"avoid_reach": 0.6}),
+            network=network, steps=16_000_000, chunk=30, eval_episodes=800,
         )  # fmt: skip
