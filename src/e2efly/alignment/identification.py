@@ -35,10 +35,10 @@ ROTOR_STRUCTURE = STRUCTURE | {
 }  # fmt: skip
 """The same when rotor speeds were measured. Fields that are added: in their unit. Gusts, and the drag of the rotors
 themselves, count as drag of the body."""
-MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.035, "inertia": 0.045, "torque_ratio": 0.1, "motor_time_constant": 0.12}
+MOTOR_STRUCTURE = STRUCTURE | {"thrust_map": 0.035, "inertia": 0.02, "torque_ratio": 0.1, "motor_time_constant": 0.12}
 """The same when motor outputs drive the simulation. The relation between outputs and thrust is then assumed, and so are
 one lag up and down, and the accelerometer's filter. Measured on such vehicles as `PULLED` in `misfit`, seeds
-0 to 8. Torques need the arms, too, which outputs cannot show: 4 % of the inertia are theirs (arms off by up to 7 %)."""
+0 to 8."""
 STRUCTURES = {"motor": MOTOR_STRUCTURE, "motor_and_rate": MOTOR_STRUCTURE, "rotor_speed": ROTOR_STRUCTURE}
 HELD_OUT = 5
 """One window out of this many is held out of the fit, to judge the result."""
