@@ -182,7 +182,7 @@ def _programs(setup: Setup, devices: int) -> tuple[Callable, Callable, Callable]
                 env,
                 act,
                 random_key(0, WATCHED, 0),
-                config.eval_episodes,
+                env.whole(config.eval_episodes),
                 setup.episode_steps,
                 setup.config.task.settling_s,
             )

@@ -47,21 +47,21 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
     Returns:
         The episodes by the name of their criterion, as NumPy arrays.
     """
-    rng, flown = np.random.default_rng(REPORTED), {}
+    rng, flown, count = np.random.default_rng(REPORTED), {}, setup.env.whole(episodes)
     options = fast_compile() if setup.config.fast_compile else {}
 
-    @partial(jax.jit, compiler_options=options | wide_vectors(episodes))
+    @partial(jax.jit, compiler_options=options | wide_vectors(count))
     def program(env: Env, weights: Weights, key: Any, draw: Draw) -> Episodes:
         act, steps = acting(setup.actor, weights), setup.episode_steps
         return run_episodes(
-            draw.env(env), act, key, episodes, steps, setup.config.task.settling_s, altered=partial(draw.state, env)
+            draw.env(env), act, key, count, steps, setup.config.task.settling_s, altered=partial(draw.state, env)
         )
 
     for name, env in setup.judges.items():
-        draw = Draw.of(ROWS[ALL], env.physics.nominal, rng, episodes)
+        draw = Draw.of(ROWS[ALL], env.physics.nominal, rng, count)
         draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
         found = program(with_longer_queue(env), weights, random_key(0, REPORTED), draw)
-        flown[name] = jax.tree.map(np.asarray, found)
+        flown[name] = jax.tree.map(lambda x: np.asarray(x)[:episodes], found)
     return flown
 
 

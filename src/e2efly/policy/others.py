@@ -13,8 +13,7 @@ from e2efly.policy.observation import Field
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
 AHEAD = 1.0
-"""Time within which the others come nearest that a vehicle observes, s. Of two vehicles at the same distance, the one
-that approaches counts as nearer."""
+"""Time within which the closest approach of two vehicles counts, s."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ def nobody(n: int, count: int, like: Array) -> Others:
 
 def others_fields(count: int) -> tuple[Field, Field]:
     """The fields of the observation for the `count` nearest other vehicles: `Others.offsets` and `Others.motion`."""
-    where = f"positions of the {count} others that come nearest within a second, minus the vehicle's"
+    where = f"positions of the {count} nearest other vehicles minus the vehicle's"
     motion = "velocities of the same others, minus the vehicle's"
     return (
         Field("others", 3 * count, "world", "m", 2.0, where),

@@ -32,7 +32,7 @@ def squared_distances(position: Float[Array, "n 3"], agents: int) -> Float[Array
 
 
 def nearest(body: Any, agents: int, count: int) -> Others:
-    """The others that come nearest to each vehicle within the next second (`approach`), the nearest first.
+    """The nearest others of each vehicle, the nearest first.
 
     Args:
         body: the motion of n vehicles, with `position` and `velocity`.
@@ -40,8 +40,7 @@ def nearest(body: Any, agents: int, count: int) -> Others:
         count: how many to choose. If there are fewer others, the rest is `nobody`.
     """
     n, there = body.position.shape[0], min(count, agents - 1)
-    away = approach(pairs(body.position, agents), pairs(body.velocity, agents))
-    away = jax.lax.stop_gradient(jnp.where(jnp.eye(agents, dtype=bool), jnp.inf, away))
+    away = jax.lax.stop_gradient(squared_distances(body.position, agents))
     motion = jnp.concatenate([body.position, body.velocity], axis=-1).reshape(-1, agents, 6)
     found = []
     for _ in range(there):

@@ -9,7 +9,7 @@ from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.pose.tracking import PoseTrack, track
 from e2efly.policy.odometry import Odometry
-from e2efly.policy.others import Others, approach, nobody
+from e2efly.policy.others import Others, nobody
 
 FASTEST = 5.0
 """Speed with which a vehicle that is not seen may come nearer, m/s."""
@@ -49,7 +49,7 @@ class Neighbours:
         return None
 
     def nearest(self, odometry: Odometry, now: float, count: int) -> Others:
-        """The `count` others that come nearest within the next second, for one vehicle, in the axes of its odometry.
+        """The `count` nearest others, for one vehicle, in the axes of its odometry.
 
         They have flown on with their velocity. One that has not been seen for longer than usual is a ball, whose radius
         grows by `FASTEST`: it is shown at the point of the ball that is nearest to the vehicle.
@@ -63,9 +63,7 @@ class Neighbours:
             offset = known.odometry.position + flown * known.odometry.velocity - odometry.position
             away = float(np.linalg.norm(offset))
             shown = max(away - FASTEST * max(age - self.max_age, 0.0), min(away, LEAST))
-            offset = offset * (shown / max(away, 1e-9))
-            motion = known.odometry.velocity - odometry.velocity
-            found.append((float(approach(tuple(offset), tuple(motion))), offset, known.odometry.velocity))
+            found.append((shown, offset * (shown / max(away, 1e-9)), known.odometry.velocity))
         found.sort(key=lambda one: one[0])
         absent = nobody(1, count, odometry.position)
         position, velocity = absent.position + odometry.position, absent.velocity

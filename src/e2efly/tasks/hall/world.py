@@ -4,6 +4,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +15,7 @@ from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.generate import corridor
 from e2efly.simulation.scenes.scene import Scene, join
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
+from e2efly.tasks.hall import HallConfig
 
 BEYOND = 10.0
 """Length of the walls behind the end of the hall, m."""
@@ -35,6 +37,8 @@ class HallWorld(AvoidWorld):
 class Hall(Avoid):
     """Starts at one end of a random hall."""
 
+    config: HallConfig
+
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, HallWorld]:
         """At rest at the end of the hall, facing it."""
         state, world = super().start(key, n)
@@ -43,7 +47,7 @@ class Hall(Avoid):
         turn = jax.random.uniform(turn_key, crate.shape, maxval=math.pi / 2)
         return state, HallWorld(world.speed, world.trees, crate, turn)
 
-    def scene(self, memory: HallWorld) -> Scene:
+    def scene(self, memory: Any) -> Scene:
         """The pillars, the crates and the walls on a level floor."""
         c, trees, n = self.config, memory.trees, memory.speed.shape[0]
         zero = jnp.zeros_like(memory.turn)

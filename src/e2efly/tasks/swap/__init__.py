@@ -35,7 +35,7 @@ class SwapConfig(TaskConfig):
     agents: int = number(8, low=2, high=64, sets_shapes=True)
     """Number of vehicles in a world (sets shapes)."""
     neighbours: int = number(2, low=1, high=63, sets_shapes=True)
-    """Number of others that a vehicle observes: those that come nearest within the next second (sets shapes)."""
+    """Number of nearest others that a vehicle observes (sets shapes)."""
     episode_s: float = 10.0
     """Length of an episode, s."""
     centre: tuple[float, float, float] = number((0.0, 0.0, 2.0), low=-math.inf)
@@ -114,9 +114,9 @@ class SwapConfig(TaskConfig):
                 cls.training(), PPOConfig(), RewardConfig(weights, {"avoid_reach": 0.6}), network=network,
                 steps=20_000_000,
             )  # fmt: skip
-        weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 20.0}
+        weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 10.0}
         return TrainConfig(
             cls.training(), BPTTConfig(envs=256, horizon=96, average=0.99),
-            RewardConfig(weights, {"avoid_reach": 0.6}),
+            RewardConfig(weights, {"avoid_reach": 0.8}),
             network=network, steps=16_000_000, chunk=30, eval_episodes=800,
         )  # fmt: skip
