@@ -102,14 +102,8 @@ class SwapConfig(TaskConfig):
         network = NetworkConfig((128, 64))
         if algo == "ppo":
             weights = {
-                "near": 1.0,
-                "prog1": 1.0,
-                "avoid": 0.3,
-                "v1": 0.02,
-                "anglev_sq": 0.002,
-                "act2_sq": 0.02,
-                "crash": 10.0,
-            }
+                "near": 1.0, "prog1": 1.0, "avoid": 0.3, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0,
+            }  # fmt: skip
             return TrainConfig(
                 cls.training(), PPOConfig(), RewardConfig(weights, {"avoid_reach": 0.6}), network=network,
                 steps=20_000_000,
