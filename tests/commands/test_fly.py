@@ -135,6 +135,11 @@ def test_a_race_that_is_told_a_speed_is_flown_by_the_policy_that_obeys_it(capsys
     assert _chosen(copied, Console())[0] == policy_file("race_speed")
 
 
+def test_a_vehicle_with_six_rotors_is_refused_before_anything_is_opened() -> None:
+    with pytest.raises(ValueError, match="vehicle 'hexa' has 6 rotors; accepted by fly: four level rotors"):
+        _prepared(parse(["--vehicle", "hexa"]), Console())
+
+
 def test_each_image_has_an_option_of_its_own() -> None:
     assert parse(["avoid", "--image", "a=shm:x", "--image", "b=shm:y"]).image == ("a=shm:x", "b=shm:y")
 

@@ -278,3 +278,11 @@ def test_where_motors_may_be_at_their_ends_nothing_is_learned(throttle: float, s
     m = ThrottleMap.of(VEHICLE)
     assert learn(m, throttle, np.array([0.0, 0.0, 0.5 * m.force(throttle)]), 3.9, 0.02, swing) == m
     assert learn(m, 0.6, np.array([0.0, 0.0, 0.9 * m.force(0.6)]), 3.9, 0.02, 0.1) != m
+
+
+@pytest.mark.parametrize("name", ["vis_r", "crazyflie", "hexa", "octo"])
+def test_full_throttle_is_the_thrust_of_all_rotors(name: str) -> None:
+    vehicle = load_vehicle(name)
+    new = ThrottleMap.of(vehicle)
+    assert new.nominal(1.0) == pytest.approx(float(vehicle.thrust_to_weight) * 9.81, rel=1e-3)
+    assert new.nominal(new.throttle(9.81)) == pytest.approx(9.81, rel=1e-6)

@@ -48,6 +48,7 @@ from e2efly.runs.rundir import run_of
 from e2efly.tasks.route import Route, course_for, fields_of, goal_notes, route_of
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 CONNECT_S = 5.0
 """How long the controller may take to send its first answer, s."""
@@ -214,6 +215,7 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
         raise ValueError(f"flight.fence.{name} is {known!r} and --guard is 'switch'; accepted: with --guard filter")
     flies = options.vehicle or _own_vehicle(policy, loaded)
     body = load_vehicle(flies)
+    check_quadrotor(body, "fly")
     hover = hover_controller(options.hover, body, body.latency if options.latency is None else options.latency)
     filter = None
     if options.guard == "filter":

@@ -52,6 +52,7 @@ from e2efly.policy.runtime import Decision, Imu
 from e2efly.policy.worker import Worker
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
 """Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
@@ -116,7 +117,11 @@ class Bridge:
             filter: keeps the policy inside the fence. None: the guard ends the policy's flight at the fence.
             hover: the controller for take-off, hover and landing. None: the default controller, for this latency.
             neighbours: the other vehicles. None: nothing is known of any.
+
+        Raises:
+            ValueError: for a vehicle that is not a quadrotor with level rotors.
         """
+        check_quadrotor(vehicle, "a flight")
         delay: float = vehicle.latency if latency is None else latency
         self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
         self.gentle = flight_gains(vehicle, delay)

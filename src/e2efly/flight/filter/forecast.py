@@ -126,7 +126,7 @@ class Response:
         gx, gy, gz = (float(g) for g in vehicle.rate_gain)
         rx, ry, rz = (float(r) for r in vehicle.body_rate_max)
         return Response(
-            thrust=(4 * low / mass, 4 * high / mass),
+            thrust=(float(vehicle.lift) * low / mass, float(vehicle.lift) * high / mass),
             motor_time=float(vehicle.motor_time_constant),
             gain=(gx, gy, gz),
             spread=(jx / (mass * arm_y), jy / (mass * arm_x), jz / (mass * float(vehicle.torque_ratio))),

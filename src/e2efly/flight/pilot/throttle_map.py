@@ -66,6 +66,8 @@ class ThrottleMap:
     """Hash of the vehicle to which the map belongs."""
     mass: float
     """kg."""
+    lift: float
+    """Number of rotors, or `Vehicle.lift` of tilted ones."""
     thrust_map: tuple[float, float, float]
     """Thrust of a rotor as a polynomial of its speed: k2, k1, k0."""
     speed: tuple[float, float]
@@ -94,7 +96,7 @@ class ThrottleMap:
         top = vehicle.thrust_range[1]
         full = (-k1 + math.sqrt(k1**2 + 4 * k2 * (top - k0))) / (2 * k2)
         idle = float(vehicle.rotor_speed_min)
-        return ThrottleMap(vehicle.hash, float(vehicle.mass), (k2, k1, k0), (idle, full), voltage)
+        return ThrottleMap(vehicle.hash, float(vehicle.mass), float(vehicle.lift), (k2, k1, k0), (idle, full), voltage)
 
     @property
     def doubt(self) -> float:
@@ -109,7 +111,7 @@ class ThrottleMap:
         k2, k1, k0 = self.thrust_map
         idle, full = self.speed
         speed = idle + throttle * (full - idle)
-        return 4 * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
+        return self.lift * max((k2 * speed + k1) * speed + k0, 0.0) / self.mass
 
     def force(self, throttle: float, voltage: float | None = None) -> float:
         """Specific force of a throttle from the learned map, m/s^2.
@@ -127,7 +129,7 @@ class ThrottleMap:
         """The throttle that gives a specific force, m/s^2: the inverse of `force`, limited to [0, 1]."""
         k2, k1, k0 = self.thrust_map
         idle, full = self.speed
-        thrust = max(force, 0.0) / self._factor(voltage) * self.mass / 4
+        thrust = max(force, 0.0) / self._factor(voltage) * self.mass / self.lift
         inside = k1**2 + 4 * k2 * (thrust - k0)
         speed = (-k1 + math.sqrt(max(inside, 0.0))) / (2 * k2)
         return min(max((speed - idle) / (full - idle), 0.0), 1.0)

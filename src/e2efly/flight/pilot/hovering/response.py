@@ -54,7 +54,7 @@ class UnderWay:
 
 def thrust_of(vehicle: Vehicle, speeds: Sequence[float]) -> float | None:
     """The collective thrust over mass, m/s^2, of rotors with these speeds, rad/s. None: not all speeds are measured."""
-    if len(speeds) != 4 or min(speeds) <= 0:
+    if len(speeds) != vehicle.rotor_count or min(speeds) <= 0:
         return None
     return float(sum(map(vehicle.rotor_thrust, speeds)) / vehicle.mass)
 
@@ -71,7 +71,7 @@ def sent(before: UnderWay, command: Ctbr, seconds: float, vehicle: Vehicle, late
     """The commands under way after a command was held for some time. The command was the newest for `seconds`, s. The
     vehicle's motor lag and rate gains are used. `latency` is the time from its motion to its rate loop, s.
     """
-    low, high = (4 * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
+    low, high = (float(vehicle.lift) * float(limit) / float(vehicle.mass) for limit in vehicle.thrust_range)
     given = namespace(command.thrust).clip(command.thrust, low, high)
     commands, thrust, rate = [*before.commands, (seconds, Ctbr(given, command.rate))], before.thrust, before.rate
     over = sum(held for held, _ in commands) - latency
