@@ -105,7 +105,9 @@ def test_what_every_task_is_judged_by_and_flies_lies_in_its_training(name: str) 
     assert domain is not None
     for suite in trained.criteria().values():
         assert outside(domain, suite.domain() or ()) == ()
-    contract = dataclasses.replace(load_policy(FOLDER / "vis_r" / f"{name}.onnx").contract, courses=domain)
+    known = name if (FOLDER / "vis_r" / f"{name}.onnx").is_file() else "hover"  # the zoo has no policy of some tasks
+    contract = load_policy(FOLDER / "vis_r" / f"{known}.onnx").contract
+    contract = dataclasses.replace(contract, task=name, courses=domain)
     assert outside(domain, route_of(contract)().domain()) == ()
 
 

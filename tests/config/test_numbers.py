@@ -38,8 +38,8 @@ ELSEWHERE = {
 """Fields that their own checks know."""
 SIGNED = {
     "camera_pitch", "camera_position", "centre", "circle_rate", "ground_height", "high", "log_std", "look_at", "low",
-    "only", "origin", "origin_yaw", "pad", "phase", "pitch", "position", "slit", "slit_roll", "slit_yaw", "target",
-    "turn_rate",
+    "only", "origin", "origin_yaw", "pad", "phase", "pitch", "position", "rise", "slit", "slit_roll", "slit_yaw",
+    "target", "thrower", "turn_rate",
 }  # fmt: skip
 """Fields that may be below 0: positions, angles, rates with a sense."""
 POSITIVE = {

@@ -111,7 +111,7 @@ def test_the_cushion_is_that_of_cheeseman_and_bennett(heights: float, gain: floa
 def test_the_ground_lifts_a_vehicle_that_hovers_low() -> None:
     rises = []
     for height in (0.06, 2.0):
-        env = Env.of(HoverConfig(target=(0.0, 0.0, 2.0)), REWARD, EnvConfig(ground_effect=1.0))
+        env = Env.of(HoverConfig(target=(0.0, 0.0, 2.0)), REWARD, EnvConfig(cushion=1.0))
         state, _ = env.reset(random_key(0), 1)
         level = at_rest(jnp.array([[0.0, 0.0, height]]))
         state = dataclasses.replace(state, vehicle=dataclasses.replace(

@@ -47,7 +47,7 @@ def changed(path: str, value: Any) -> Any:
         ("reward.weights", ["near"], "reward: weights is ['near']; accepted: an object, with a number each"),
         ("reward.weights.vel", "1", "reward: weights.vel is '1'; accepted: a number"),
         ("curriculum.0.changes", None, "curriculum[0]: changes is None; accepted: an object, with a number or"),
-        ("task_name", ["avoid"], "task_name is ['avoid']; accepted: avoid, dodge, gap, hall, hover"),
+        ("task_name", ["avoid"], "task_name is ['avoid']; accepted: avoid, avoid_together, dodge, gap, hall, hover"),
         ("algo_name", None, "algo_name is None; accepted: ppo, bptt"),
     ],
 )

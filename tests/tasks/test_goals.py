@@ -381,7 +381,9 @@ def test_bad_options_are_named(
 
 def test_policies_of_other_tasks_and_routes_are_refused(contracts: dict[str, Contract]) -> None:
     other = dataclasses.replace(contracts["hover"], task="perch")
-    with pytest.raises(ValueError, match=r"unknown task 'perch'.*there are: avoid, dodge, gap, hall, hover"):
+    with pytest.raises(
+        ValueError, match=r"unknown task 'perch'.*there are: avoid, avoid_together, dodge, gap, hall, hover"
+    ):
         course_for(other, VEHICLE)
     with pytest.raises(ValueError, match="goal is a LandRoute; accepted: a HoverRoute, for task 'hover'"):
         course_for(contracts["hover"], VEHICLE, LandRoute())

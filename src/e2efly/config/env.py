@@ -247,7 +247,7 @@ class EnvConfig:
     downwash: float = number(0.0, high=3.0, added=True)
     """Velocity of the air that the other vehicles of a world blow downwards, relative to a turbulent jet of their
     weight. Only for tasks with several vehicles in a world. 0: none (sets the program)."""
-    ground_effect: float = number(0.0, high=3.0, added=True)
+    cushion: float = number(0.0, high=3.0, added=True)
     """Additional thrust of a rotor near the ground z = 0, relative to the formula of Cheeseman and Bennett. 0: none
     (sets the program)."""
     disturbance: DisturbanceConfig = DisturbanceConfig()

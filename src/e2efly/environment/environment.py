@@ -87,7 +87,7 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "posterior", "wind", "downwash", "ground_effect", "disturbance",
+        "observation_latency_range", "randomize", "posterior", "wind", "downwash", "cushion", "disturbance",
         "estimate", "link", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
@@ -116,7 +116,7 @@ class Env:
     """Largest wind speed, m/s; None: still air."""
     downwash: Any
     """See `EnvConfig`; None: there is none."""
-    ground_effect: Any
+    cushion: Any
     """See `EnvConfig`; None: there is none."""
     disturbance: DisturbanceConfig | None
     estimate: EstimateConfig | None
@@ -198,7 +198,7 @@ class Env:
             posterior=posterior and dataclasses.replace(posterior, root=posterior.root.astype(dtype)),
             wind=config.wind or None,
             downwash=config.downwash or None,
-            ground_effect=config.ground_effect or None,
+            cushion=config.cushion or None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             estimate=None if config.estimate == EstimateConfig() else config.estimate,
             link=None if config.link == LinkConfig() else config.link,
@@ -228,7 +228,7 @@ class Env:
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
         parts = (self.disturbance, DisturbanceConfig()), (self.estimate, EstimateConfig()), (self.link, LinkConfig())
-        air_moves = self.wind or self.downwash or self.ground_effect
+        air_moves = self.wind or self.downwash or self.cushion
         return bool(spread or drawn or air_moves or any((part or none) != none for part, none in parts))
 
     @property
@@ -257,7 +257,7 @@ class Env:
             posterior=self.posterior and self.posterior.times(strength),
             wind=self.wind and strength * self.wind,
             downwash=self.downwash and strength * self.downwash,
-            ground_effect=self.ground_effect and strength * self.ground_effect,
+            cushion=self.cushion and strength * self.cushion,
             disturbance=self.disturbance and _times(self.disturbance, strength),
             estimate=self.estimate and _times(self.estimate, strength),
             link=self.link and _times(self.link, strength),
@@ -413,9 +413,9 @@ class Env:
         if self.downwash is not None:
             blown = self.downwash * air.downwash(air.Jet.of(physics.nominal), before, self.agents)
             wind = blown if wind is None else wind + blown
-        if self.ground_effect is not None:
+        if self.cushion is not None:
             more = air.cushion(air.propeller(physics.nominal), before.position[:, 2]) - 1
-            lifted = jnp.broadcast_to((1 + self.ground_effect * more)[:, None], before.rotor_speed.shape)
+            lifted = jnp.broadcast_to((1 + self.cushion * more)[:, None], before.rotor_speed.shape)
             share = lifted if share is None else share * lifted
         after = step(
             physics, plant, before, new, previous=old, switch_time=switch, wind=wind, rotor_share=share, push=push

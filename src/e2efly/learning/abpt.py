@@ -92,7 +92,7 @@ class ABPT(Algorithm):
         Raises:
             ValueError: for worlds of several vehicles, as its stored starts are of one vehicle each.
         """
-        if env.agents > 1:
+        if getattr(env, "agents", 1) > 1:
             raise ValueError(
                 f"algo is abpt and task.agents {env.agents}; accepted: one vehicle in a world, or another algorithm, "
                 "as abpt starts from stored states of single vehicles"

@@ -162,7 +162,7 @@ class TestScene:
             ({"uv": np.full((8, 2), 1e308)}, "object 'thing': texture coordinates .*at most 10000 in size"),
             ({"colour": np.full(3, np.inf)}, "object 'thing': colours have shape"),
             ({"colour": np.ones((1, 3))}, r"object 'thing': colours have shape \(1, 3\).*accepted: 3 numbers in"),
-            ({"label": 6}, "object 'thing': label is 6; accepted: 1 to 5"),
+            ({"label": 7}, "object 'thing': label is 7; accepted: 1 to 6"),
         ],
     )
     def test_what_is_wrong_is_named(self, about: dict[str, Any], told: str) -> None:
