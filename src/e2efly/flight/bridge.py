@@ -359,8 +359,8 @@ class Bridge:
         if self._blindness(now) is None:
             frames = [seen.frame for seen in self.seen if seen.frame is not None]
             images = [frame.image.astype(np.float32) for frame in frames]
-            near = self.neighbours
-            others = None if near is None else near.nearest(odometry, now, worker.neighbours)
+            near, count = self.neighbours, worker.neighbours
+            others = None if near is None or not count else near.nearest(odometry, now, count)
             if worker.step(odometry, now, slack, self.imu, images, others) and self.log is not None:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
