@@ -55,15 +55,15 @@ def test_every_task_flies_under_every_command_mode(name: str, mode: str) -> None
     }  # fmt: skip
     for options in ({}, config):
         env = make(TASKS[name].training(), command_mode=mode, **options)
-        key = random_key(0)
-        state, observation = jax.eval_shape(lambda env=env, key=key: env.reset(key, N))
-        after, out = jax.eval_shape(env.step, state, jax.ShapeDtypeStruct((N, 4), jnp.float32))
+        key, n = random_key(0), env.whole(N)
+        state, observation = jax.eval_shape(lambda env=env, key=key, n=n: env.reset(key, n))
+        after, out = jax.eval_shape(env.step, state, jax.ShapeDtypeStruct((n, 4), jnp.float32))
         assert jax.tree.structure(after) == jax.tree.structure(state)
         assert [(x.shape, x.dtype) for x in jax.tree.leaves(after)] == [
             (x.shape, x.dtype) for x in jax.tree.leaves(state)
         ]
-        assert out.observation.shape == out.final_observation.shape == observation.shape == (N, env.observation_size)
-        assert out.reward.shape == out.terminated.shape == out.success.shape == out.error.shape == (N,)
+        assert out.observation.shape == out.final_observation.shape == observation.shape == (n, env.observation_size)
+        assert out.reward.shape == out.terminated.shape == out.success.shape == out.error.shape == (n,)
         assert env.observation_size == sum(f.size for f in env.fields)
 
 

@@ -110,6 +110,7 @@ def test_random_polynomials_are_smooth_and_stay_in_their_box() -> None:
 @pytest.mark.whole(but=1)
 @pytest.mark.parametrize("name", list(TASKS))
 def test_each_task_starts_in_a_process_that_knows_no_other(name: str) -> None:
-    code = f"import jax, e2efly; jax.eval_shape(lambda k: e2efly.make_env({name!r}).reset(k, 2), jax.random.key(0))"
+    made = f"import jax, e2efly; env = e2efly.make_env({name!r}); n = env.whole(2)"
+    code = f"{made}; jax.eval_shape(lambda k: env.reset(k, n), jax.random.key(0))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
