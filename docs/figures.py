@@ -31,6 +31,7 @@ GOALS = {
 """Rows of the table of README.md."""
 TITLES = {
     "rates": "Rates",
+    "many_vehicles": "Vehicles that share a world, beside vehicles alone",
     "rate_loop": "What a held rate loop costs",
     "mesh_rendering": "Rendering of mesh scenes",
     "rendering": "Images of the clutter scene: ground, 4 gates, 16 obstacles, another world for each camera",
@@ -93,7 +94,8 @@ POLICIES = {
     ),
     **dict.fromkeys(
         (
-            "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify", "step_response",
+            "many_vehicles", "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify",
+            "step_response",
             "identify_structure", "step_alignment", "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz",
             "log_fuzz",
         ),
