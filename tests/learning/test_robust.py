@@ -24,7 +24,7 @@ ROBUST = [name for name, task in TASKS.items() if task.robust and task.__module_
 def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
     names = (
         "avoid avoid_together dodge gap hall hover hover_aware land land_visual race race_clutter race_clutter_room "
-        "race_speed swap track"
+        "race_speed track"
     )
     assert names.split() == ROBUST
     for task in ROBUST:
@@ -51,7 +51,7 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
         "preset 'robust': accepted for avoid by bptt, avoid_together by bptt, dodge by bptt, gap by bptt, "
         "hall by bptt, hover by bptt or ppo, hover_aware by bptt, land by bptt, "
         "land_visual by bptt, race by bptt, race_clutter by bptt, race_clutter_room by bptt, "
-        "race_speed by bptt, swap by bptt, track by bptt or ppo" in said
+        "race_speed by bptt, track by bptt or ppo" in said
     )
     assert f"not for {task} by {algo}" in said
 

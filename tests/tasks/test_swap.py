@@ -52,8 +52,11 @@ class TestCompany:
             np.testing.assert_allclose(found.velocity[i], velocity[order], rtol=1e-6)
 
     def test_who_is_not_there_is_far_away_and_at_rest(self) -> None:
-        found = company.nearest(anywhere(4), 2, 3)
-        assert np.all(np.asarray(found.position)[:, 1:, 2] == FAR) and not np.any(np.asarray(found.velocity)[:, 1:])
+        body = anywhere(4)
+        found = company.nearest(body, 2, 3)
+        above = np.asarray(found.position)[:, 1:] - np.asarray(body.position)[:, None]
+        np.testing.assert_allclose(above, np.broadcast_to([0.0, 0.0, FAR], above.shape), atol=1e-5)
+        assert not np.any(np.asarray(found.velocity)[:, 1:])
 
     def test_the_gap_to_come_is_that_of_straight_flight(self) -> None:
         two = moving([[0, 0, 0], [2, 0.3, 0]], [[1, 0, 0], [-1.0, 0, 0]])  # they pass each other after a second

@@ -12,8 +12,6 @@ from e2efly.policy.observation import Field
 
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
-AHEAD = 1.0
-"""Time within which the closest approach of two vehicles counts, s."""
 
 
 @dataclass(frozen=True)
@@ -38,22 +36,11 @@ class Others:
         return Others(origin.seen(self.position), origin.seen_vectors(self.velocity))
 
 
-def approach(offset: tuple[Array, ...], motion: tuple[Array, ...]) -> Array:
-    """Squared distance at the closest approach within `AHEAD`, m^2, if both vehicles fly straight on.
-
-    Args:
-        offset: x, y, z of the other's position minus the vehicle's, m.
-        motion: x, y, z of its velocity minus the vehicle's, m/s.
-    """
-    (x, y, z), (vx, vy, vz) = offset, motion
-    when = (-(x * vx + y * vy + z * vz) / (vx * vx + vy * vy + vz * vz + 1e-9)).clip(0.0, AHEAD)
-    return (x + when * vx) ** 2 + (y + when * vy) ** 2 + (z + when * vz) ** 2
-
-
-def nobody(n: int, count: int, like: Array) -> Others:
-    """No other vehicle: all are `FAR` above, at rest. The library is that of `like`."""
-    zero = namespace(like).zeros((n, count, 3))
-    return Others(zero + namespace(like).asarray([0.0, 0.0, FAR]), zero)
+def nobody(position: Array, count: int) -> Others:
+    """`count` vehicles that are not there, for vehicles at positions (n, 3), m: all are `FAR` above, at rest."""
+    xp = namespace(position)
+    zero = xp.zeros((position.shape[0], count, 3))
+    return Others(position[:, None] + xp.asarray([0.0, 0.0, FAR]) + zero, zero)
 
 
 def others_fields(count: int) -> tuple[Field, Field]:

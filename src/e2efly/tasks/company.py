@@ -11,12 +11,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from e2efly.policy.others import FAR, Others, approach, nobody
+from e2efly.policy.others import FAR, Others, nobody
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import VEHICLE, Solids
 from e2efly.tasks.task import path_within
 
 jax.tree_util.register_dataclass(Others)
+AHEAD = 1.0
+"""Time within which the closest approach of two vehicles counts, s."""
 
 
 def pairs(x: Float[Array, "n 3"], agents: int) -> tuple[Float[Array, "w a a"], ...]:
@@ -47,16 +49,18 @@ def nearest(body: Any, agents: int, count: int) -> Others:
         chosen = jax.nn.one_hot(jnp.argmin(away, axis=-1), agents, dtype=body.position.dtype)
         found.append(jnp.einsum("wij,wjc->wic", chosen, motion).reshape(n, 1, 6))
         away = jnp.where(chosen > 0, jnp.inf, away)
-    absent = nobody(n, count - there, body.position)
+    absent = nobody(body.position, count - there)
     both = jnp.concatenate([*found, jnp.concatenate([absent.position, absent.velocity], axis=-1)], axis=1)
     return Others(both[..., :3], both[..., 3:])
 
 
 def misses(body: Any, agents: int, reach: float | Array) -> Float[Array, "n a"]:
-    """Gap between each vehicle and each of its world at the closest approach within the next second, m, for the reward
+    """Gap between each vehicle and each of its world at the closest approach within `AHEAD`, m, for the reward
     term `apart`. They touch at a distance of `reach`, m. For a vehicle and itself it is large.
     """
-    away = approach(pairs(body.position, agents), pairs(body.velocity, agents))
+    (x, y, z), (vx, vy, vz) = pairs(body.position, agents), pairs(body.velocity, agents)
+    when = jnp.clip(-(x * vx + y * vy + z * vz) / (vx * vx + vy * vy + vz * vz + 1e-9), 0.0, AHEAD)
+    away = (x + when * vx) ** 2 + (y + when * vy) ** 2 + (z + when * vz) ** 2
     own = jnp.eye(agents, dtype=bool)
     return jnp.where(own, FAR, jnp.sqrt(jnp.where(own, 1.0, away) + 1e-8) - reach).reshape(-1, agents)
 

@@ -65,11 +65,10 @@ class Neighbours:
             shown = max(away - FASTEST * max(age - self.max_age, 0.0), min(away, LEAST))
             found.append((shown, offset * (shown / max(away, 1e-9)), known.odometry.velocity))
         found.sort(key=lambda one: one[0])
-        absent = nobody(1, count, odometry.position)
-        position, velocity = absent.position + odometry.position, absent.velocity
+        others = nobody(odometry.position[None], count)
         for i, (_, offset, speed) in enumerate(found[:count]):
-            position[0, i], velocity[0, i] = odometry.position + offset, speed
-        return Others(position, velocity)
+            others.position[0, i], others.velocity[0, i] = odometry.position + offset, speed
+        return others
 
     def close(self) -> None:
         """Close all sources."""

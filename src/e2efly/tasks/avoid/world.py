@@ -3,12 +3,14 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.policy.goal import Outcome
+from e2efly.policy.others import Others
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.generate import forest
@@ -52,11 +54,16 @@ class Avoid(AvoidGoal):
         away = self.goal(memory, memory.speed) - flier.position
         bearing = jnp.arctan2(away[:, 1], away[:, 0])
         side = self.config.forest.width / 2
-        others = getattr(memory, "bodies", None)
+        others = self.others(memory)
         heading = best_heading(memory.trees, flier, bearing, memory.speed, self.shape.radius, side, others)
         level = memory.speed[:, None] * jnp.stack([jnp.cos(heading), jnp.sin(heading)], axis=-1)
         climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
         return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
+
+    def others(self, memory: Any) -> Others | None:
+        """The other vehicles, which the expert flies around."""
+        del memory
+        return None
 
     def scene(self, memory: AvoidWorld) -> Scene:
         """The trees on level ground."""

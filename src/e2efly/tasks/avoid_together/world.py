@@ -65,6 +65,10 @@ class AvoidTogether(Avoid):
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
         return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no)
 
+    def others(self, memory: Any) -> Others:
+        """All others of the world."""
+        return memory.bodies
+
     def scene(self, memory: Any) -> Scene:
         """The trees and the others on level ground."""
         others = company.spheres(memory.bodies, memory.time, self.shape.radius)

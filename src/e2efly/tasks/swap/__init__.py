@@ -10,7 +10,6 @@ from e2efly.config import (
     NetworkConfig,
     PPOConfig,
     RewardConfig,
-    Robust,
     TaskConfig,
     TrainConfig,
     number,
@@ -30,7 +29,6 @@ class SwapConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.swap.goal:SwapRoute"
     best: ClassVar = "bptt"
     shows_error: ClassVar = True
-    robust: ClassVar = {"bptt": Robust(steps=12_000_000, chunk=30, recurrent=32, hidden=(128, 64))}
 
     agents: int = number(8, low=2, high=64, sets_shapes=True)
     """Number of vehicles in a world (sets shapes)."""

@@ -114,7 +114,7 @@ class SwapRoute(Route):
     def course(self, shape: Shape, control_period: float) -> Course:
         """The course to the place. It has no end."""
         goal = SwapGoal(dataclasses.replace(SwapConfig(), centre=self.target), shape, control_period, 1)
-        others = nobody(1, goal.neighbours, np.zeros(3))
+        others = nobody(np.array([self.target]), goal.neighbours)
         start = np.add(self.target, (1.5, -1.0, 0.0))
         memory = SwapMemory(np.array([self.target]), np.zeros(1), others)
         return Course(goal, memory, start, duration=math.inf, points=[self.target])
