@@ -48,6 +48,9 @@ class Eval:
     controller: Controller = "policy"
     """The vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever flies. plant:
     the vehicle that flies."""
+    rival: Path | None = None
+    """Race against another policy, from unseen starts: for a policy of race_duel. A policy of race, which sees no
+    others, can be the rival."""
     stress: bool = False
     """Test robustness, row by row, with vehicles, air and sensors that differ from the training. See
     docs/robustness.md."""
@@ -100,6 +103,8 @@ def run(asked: Asked) -> int:
     check_stress(options.stress, options.rows, options.least)
     if options.stress:
         return _stress(options)
+    if options.rival is not None:
+        return _duel(options, options.rival, asked)
     from e2efly.validation.evaluation import ROW, evaluate
     from e2efly.viewing.evaluation_plots import plot_evaluation
 
@@ -122,6 +127,27 @@ def _stress(o: Eval) -> int:
 
     found = stress(o.policy, o.episodes, rows=o.rows, **_flies(o))
     return report_stress(found, Terminal(), o.json, _folder(o, found.candidate) / "stress.png", o.least)
+
+
+def _duel(o: Eval, rival: Path, asked: Asked) -> int:
+    from e2efly.validation.duels import duel
+
+    only = {"--vehicle": o.vehicle, "--baseline": o.baseline, "--env": asked.env or None, "--plots": o.plots}
+    if wrong := [name for name, value in only.items() if value is not None]:
+        raise ValueError(f"{', '.join(wrong)} is given with --rival; accepted: --task, --episodes, --seed and --json")
+    console = Terminal()
+    found = duel(str(o.policy), str(rival), o.episodes, task=asked.task, seed=o.seed).as_json()
+    table = headed(f"of {o.episodes} races", "policy", "rival")
+    table.add_row("won", f"{found['won']:.1%}", f"{found['lost']:.1%}")
+    table.add_row("95 % interval", "{:.1%} to {:.1%}".format(*found["won_interval_95"]), "")
+    table.add_row("out at a gate", f"{found['out']:.1%}", f"{found['rival_out']:.1%}")
+    table.add_row("touched another", f"{found['touched']:.1%}", "")
+    table.add_row("time at the finish", seconds(found["seconds"]), seconds(found["rival_seconds"]))
+    console.print(table)
+    if o.json:
+        write_json(o.json, found)
+        console.print(f"Report: {o.json}")
+    return 0
 
 
 def _flies(o: Eval) -> dict[str, Any]:

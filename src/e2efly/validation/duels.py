@@ -1,0 +1,138 @@
+"""Races of one policy against another. Used by `e2efly eval --rival`."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import PRNGKeyArray
+
+from e2efly.config.changes import changed
+from e2efly.courses.tracks import load_track
+from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment.episodes import Act, wilson
+from e2efly.policy.contract import Contract
+from e2efly.simulation.device import wide_vectors
+from e2efly.validation.evaluation import SEED, act_of, candidate
+
+LAPS = 3
+"""Laps of a race on a closed track."""
+LONGEST = 40.0
+"""Time after which a race is over, s."""
+WORLDS = 125
+"""Number of races that are flown at once."""
+
+
+@dataclass(frozen=True)
+class Duels:
+    """The results of w races of a policy and its rivals. The rows are racers: (w, a), the policy's first."""
+
+    time: np.ndarray
+    """(w, a) time at the finish, s. Infinite for a racer that does not finish, or that was out or touched another."""
+    touched: np.ndarray
+    """(w, a) whether the racer touched another before it had finished."""
+    out: np.ndarray
+    """(w, a) whether the racer missed or touched a gate, or left the track."""
+
+    @property
+    def won(self) -> np.ndarray:
+        """(w,) the policy finished before all of its rivals."""
+        return np.isfinite(self.time[:, 0]) & (self.time[:, 0] < self.time[:, 1:].min(axis=1))
+
+    @property
+    def lost(self) -> np.ndarray:
+        """(w,) a rival finished before the policy."""
+        return np.isfinite(self.time[:, 1:].min(axis=1)) & (self.time[:, 1:].min(axis=1) < self.time[:, 0])
+
+    def as_json(self) -> dict[str, Any]:
+        """Shares of the races, with the 95 % interval of the wins by Wilson, and mean times of those that finish."""
+
+        def mean(times: np.ndarray) -> float | None:
+            finite = times[np.isfinite(times)]
+            return round(float(finite.mean()), 3) if finite.size else None
+
+        n = len(self.won)
+        return {
+            "races": n,
+            "won": float(self.won.mean()),
+            "won_interval_95": [round(x, 4) for x in wilson(int(self.won.sum()), n)],
+            "lost": float(self.lost.mean()),
+            "touched": float(self.touched.any(axis=1).mean()),
+            "out": float(self.out[:, 0].mean()),
+            "rival_out": float(self.out[:, 1:].mean()),
+            "seconds": mean(self.time[:, 0]),
+            "rival_seconds": mean(self.time[:, 1:]),
+        }
+
+
+def duel(
+    policy: str, rival: str, races: int = 500, *, task: Mapping[str, Any] | None = None, seed: int = SEED
+) -> Duels:
+    """Fly a policy of `race_duel` against another, from unseen starts. One racer of each world is the policy's.
+
+    Args:
+        policy: a run directory, a policy.onnx, or a task of the zoo.
+        rival: the same, of any task whose fields `race_duel` observes, too: a policy of `race` sees no others.
+        races: number of races.
+        task: options of the policy's task by dotted name. By default a closed track has `LAPS` laps.
+        seed: the seed of the starts.
+
+    Raises:
+        ValueError: for a policy of another task, and for a rival that observes or commands something else.
+    """
+    found = candidate(policy)
+    if not hasattr(found.task, "agents") or not hasattr(found.task, "laps"):
+        raise ValueError(f"--rival is given for a policy of {found.task.name}; accepted: a policy of race_duel")
+    other = candidate(rival)
+    asked = changed(found.task, task or {}, "task")
+    laps = LAPS if load_track(asked.track).closed else 1
+    flown = changed(asked, {"laps": laps, "episode_s": LONGEST} | dict(task or {}), "task")
+    (suite,) = flown.criteria().values()
+    env = found.environment(dataclasses.replace(suite, collisions_end=False))
+    racers = (found.policy, other.policy)
+    columns = [_columns(env, racer.contract, found.policy.contract) for racer in racers]
+    parts, size = [], env.agents * min(WORLDS, races)
+    for i in range(-(-races // WORLDS)):
+        acts = [act_of(racer) for racer in racers]
+        parts.append(_raced(env, acts, columns, size, random_key(seed, UNSEEN, i)))
+    return Duels(*(np.concatenate(x)[:races] for x in zip(*parts, strict=True)))
+
+
+def _columns(env: Env, rival: Contract, own: Contract) -> np.ndarray:
+    """The entries of the observation that a rival observes, in its order."""
+    ends = np.cumsum([field.size for field in env.fields])
+    there = {(f.name, f.size): np.arange(end - f.size, end) for f, end in zip(env.fields, ends, strict=True)}
+    if lacking := [field.name for field in rival.observation if (field.name, field.size) not in there]:
+        raise ValueError(f"--rival observes {', '.join(lacking)}; accepted: {', '.join(f.name for f in env.fields)}")
+    for name in ("control_rate_hz", "past_actions", "action"):
+        if getattr(rival, name) != getattr(own, name):
+            raise ValueError(
+                f"{name} of --rival is {getattr(rival, name)}; accepted: that of the policy, {getattr(own, name)}"
+            )
+    return np.concatenate([there[field.name, field.size] for field in rival.observation])
+
+
+def _raced(
+    env: Env, acts: Sequence[Act], columns: Sequence[np.ndarray], n: int, key: PRNGKeyArray
+) -> tuple[np.ndarray, ...]:
+    """The fields of `Duels` of n racers, whose every a-th is the policy's."""
+    options = wide_vectors(n)
+    step = jax.jit(lambda env, state, action: env.step(state, action, restart=False), compiler_options=options)
+    state, observation = jax.jit(lambda env, key: env.reset(key, n), compiler_options=options)(env, key)
+    rows = np.arange(n) % env.agents
+    whose = [np.flatnonzero(rows == 0), np.flatnonzero(rows > 0)]
+    memories = [act.begin(len(mine)) for act, mine in zip(acts, whose, strict=True)]
+    time, action = np.full(n, np.inf), np.zeros((n, env.action_size), np.float32)
+    for _ in range(env.episode_steps):
+        seen = np.asarray(observation)
+        for i, (act, mine, given) in enumerate(zip(acts, whose, columns, strict=True)):
+            action[mine], memories[i] = act.act(seen[np.ix_(mine, given)], (), memories[i])
+        state, out = step(env, state, action)
+        observation, race = out.final_observation, state.memory
+        finished, failed = np.asarray(race.finished), np.asarray(race.touched | race.out)
+        time = np.where(finished & ~failed & np.isinf(time), np.asarray(state.time), time)
+        if np.all(finished | failed):
+            break
+    return tuple(np.asarray(x).reshape(-1, env.agents) for x in (time, race.touched, race.out))
