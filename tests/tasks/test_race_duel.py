@@ -28,7 +28,7 @@ def environment(**changes: Any) -> Env:
 def test_racers_start_behind_each_other_in_random_order() -> None:
     env = environment(agents=4, spacing=0.7, position=0.2)
     state, _ = env.reset(random_key(0, 0, 0), 64)
-    gates = env.task.race.gates
+    gates = env.task.track
     along = np.array([np.cos(gates.start_yaw), np.sin(gates.start_yaw)])
     place = (np.asarray(state.vehicle.position)[:, :2] - gates.start[:2]).reshape(16, 4, 2)
     ahead = place @ along
@@ -48,7 +48,7 @@ def test_a_racer_sees_the_race_and_the_other() -> None:
     where = dict(zip(names, (slice(a, b) for a, b in itertools.pairwise(columns)), strict=True))
     position = np.asarray(state.vehicle.position)
     np.testing.assert_allclose(observation[0, where["others"]], position[1] - position[0], atol=1e-5)
-    first = np.asarray(env.task.race.gates.position)[:2]
+    first = np.asarray(env.task.track.position)[:2]
     np.testing.assert_allclose(observation[3, where["gates"]], (first - position[3]).reshape(-1), atol=1e-5)
 
 
@@ -59,7 +59,7 @@ def task() -> RaceDuel:
 
 def through(task: RaceDuel, gate: int, aside: float = 0.0) -> tuple[Any, Any]:
     """Motion of one racer across a gate's plane, metres to its left."""
-    g = task.race.gates
+    g = task.track
     axis = np.array([g.cos[gate], g.sin[gate], 0.0])
     place = np.asarray(g.position[gate]) + aside * np.array([-axis[1], axis[0], 0.0])
     return place - 0.1 * axis, place + 0.1 * axis
@@ -76,7 +76,7 @@ def judged(task: RaceDuel, rows: list[tuple[Any, Any]], **memory: Any) -> tuple[
 
 def away(task: RaceDuel, gate: int) -> tuple[Any, Any]:
     """A place 1.5 m in front of a gate."""
-    g = task.race.gates
+    g = task.track
     place = np.asarray(g.position[gate]) - 1.5 * np.array([g.cos[gate], g.sin[gate], 0.0])
     return place, place
 

@@ -19,6 +19,7 @@ from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
 from e2efly.policy.observation import PAST_ACTIONS, Field, Own, own_fields
+from e2efly.policy.others import OTHERS
 from e2efly.policy.zoo import contents
 from e2efly.vehicles.family import Ranges
 from e2efly.vehicles.gravity import GRAVITY
@@ -210,6 +211,11 @@ class Contract:
         """The position of each field in the observation, by name, in order."""
         ends = list(accumulate(field.size for field in self.observation))
         return {f.name: slice(end - f.size, end) for f, end in zip(self.observation, ends, strict=True)}
+
+    @cached_property
+    def neighbours(self) -> int:
+        """Number of other vehicles that it observes."""
+        return sum(field.size for field in self.observation if field.name == OTHERS) // 3
 
     @cached_property
     def past_actions(self) -> int:

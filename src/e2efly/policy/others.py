@@ -10,6 +10,8 @@ from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
 from e2efly.policy.observation import Field
 
+OTHERS = "others"
+"""Name of the field of the positions."""
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
 
@@ -48,6 +50,6 @@ def others_fields(count: int) -> tuple[Field, Field]:
     where = f"positions of the {count} nearest other vehicles minus the vehicle's"
     motion = "velocities of the same others, minus the vehicle's"
     return (
-        Field("others", 3 * count, "world", "m", 2.0, where),
+        Field(OTHERS, 3 * count, "world", "m", 2.0, where),
         Field("others_velocity", 3 * count, "world", "m/s", 2.0, motion),
     )

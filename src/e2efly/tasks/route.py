@@ -17,6 +17,7 @@ from e2efly.courses.origin import Origin
 from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Goal, Shape
 from e2efly.policy.observation import Field
+from e2efly.policy.others import nobody
 from e2efly.tasks.registry import TASKS
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -75,8 +76,11 @@ class Route:
     def course_of(self, contract: Contract, shape: Shape) -> Course:
         """The course for a policy. If a task has several kinds of observation, the course uses that of this policy."""
         course = self.course(shape, 1 / contract.control_rate_hz)
-        options = course.goal.config.showing([field.name for field in contract.observation])
-        return dataclasses.replace(course, goal=dataclasses.replace(course.goal, config=options))
+        options, memory = course.goal.config.showing([field.name for field in contract.observation]), course.memory
+        if course.goal.neighbours:
+            options = dataclasses.replace(options, neighbours=contract.neighbours)
+            memory = course.goal.among(memory, nobody(np.atleast_2d(course.start), contract.neighbours))
+        return dataclasses.replace(course, goal=dataclasses.replace(course.goal, config=options), memory=memory)
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "Route":
@@ -141,6 +145,9 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
     """
     goal, names = goal_of(TASKS.find(contract.task)), [field.name for field in contract.observation]
     goal = goal.showing(names) if hasattr(goal, "showing") else goal
+    if getattr(goal, "neighbours", Goal.neighbours) is not Goal.neighbours:
+        shape = Shape(feet_height=0.0, radius=0.0)  # no field depends on it
+        return usual_route(contract).course_of(contract, shape).goal.fields
     if not goal.observation:
         return goal.fields  # type: ignore[return-value]
     options = TASKS.find(contract.task)().showing(names)

@@ -4,7 +4,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from e2efly.simulation.device import compute_at_once, cores, prepare
 from e2efly.tasks import TASKS
 from e2efly.validation.baseline import Baseline, acting
 from e2efly.validation.plant import Plant, RigidState
-from e2efly.validation.plant_flight import Trajectory, fly
+from e2efly.validation.plant_flight import Flying, Trajectory, flying, together
 from e2efly.validation.plants import find_plant
 from e2efly.validation.reality import Reality, check_realities
 from e2efly.vehicles.vehicle import Vehicle
@@ -51,6 +51,8 @@ class FleetMission:
     """Longest time between two samples of a log, s. None: no samples are kept."""
     baseline: str | None = None
     """The hover controller that flies in place of the policy. None: the policy flies."""
+    agents: int = 1
+    """Number of vehicles in a world: flights that are next to each other are flown in lockstep."""
 
     def acting(self) -> Policy | Baseline:
         """The policy or the baseline that flies.
@@ -104,7 +106,8 @@ def fly_all(
     count = processes or (cores() if len(flights) >= WORTH else 1)
     if not find_plant(mission.plant).parallel or count == 1:
         return _collect(_fly(mission, flights), done)
-    chunks = [flights[i : i + CHUNK] for i in range(0, len(flights), CHUNK)]
+    size = CHUNK * mission.agents
+    chunks = [flights[i : i + size] for i in range(0, len(flights), size)]
     context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an undefined state
     contract = load_policy(mission.policy).contract
     told = contract.task, bool(contract.images)
@@ -129,26 +132,37 @@ def _fly_chunk(mission: FleetMission, flights: Sequence[FleetFlight]) -> list[Tr
 
 
 def _fly(mission: FleetMission, flights: Sequence[FleetFlight]) -> Iterator[Trajectory]:
-    policy, kind = mission.acting(), mission.kind()
+    policy, kind, agents = mission.acting(), mission.kind(), mission.agents
+    with ExitStack() as stack:
+        plants = [stack.enter_context(closing(kind.of(mission.believed, policy.contract))) for _ in range(agents)]
+        met = [(mission.believed.hash, False)] * agents
+        for first in range(0, len(flights), agents):
+            world = flights[first : first + agents]
+            for i, flight in enumerate(world):
+                reality = flight.reality
+                if met[i] != (meets := (reality.body.hash, reality.plain_mixer)):
+                    plants[i].meet(reality.body, reality.plain_mixer)
+                    met[i] = meets
+            yield from together(
+                [_flying(mission, policy, plant, flight) for plant, flight in zip(plants, world, strict=True)]
+            )
+
+
+def _flying(mission: FleetMission, policy: Policy | Baseline, plant: Plant, flight: FleetFlight) -> Flying:
     names = [image.name for image in policy.contract.images]
-    with closing(kind.of(mission.believed, policy.contract)) as plant:
-        met = mission.believed.hash, False
-        for flight in flights:
-            reality = flight.reality
-            if met != (meets := (reality.body.hash, reality.plain_mixer)):
-                plant.meet(reality.body, reality.plain_mixer)
-                met = meets
-            sight = flight.sight
-            runtime = Runtime.of(policy, flight.course, mission.trained, imu=True, images=sight is not None)
-            latency = max(reality.latency - kind.latency, 0.0)
-            images = None
-            if sight is not None:
-                own = {i: name for i, name in enumerate(names) if name in mission.cameras}
-                if own:
-                    plant.expose({name: sight.shutter(i) for i, name in own.items()})
-                images = sight.begin({i: partial(plant.shown, name) for i, name in own.items()}).images
-            air, law, sample = reality.air, reality.law, mission.sample
-            yield fly(runtime, plant, flight.start, mission.duration, latency, air, sample, images, law)
+    reality, sight = flight.reality, flight.sight
+    runtime = Runtime.of(
+        policy, flight.course, mission.trained, imu=True, images=sight is not None, others=mission.agents > 1
+    )
+    latency = max(reality.latency - plant.latency, 0.0)
+    images = None
+    if sight is not None:
+        own = {i: name for i, name in enumerate(names) if name in mission.cameras}
+        if own:
+            plant.expose({name: sight.shutter(i) for i, name in own.items()})
+        images = sight.begin({i: partial(plant.shown, name) for i, name in own.items()}).images
+    air, law, sample = reality.air, reality.law, mission.sample
+    return flying(runtime, plant, flight.start, mission.duration, latency, air, sample, images, law)
 
 
 def _prepare(task: str, sees: bool) -> None:

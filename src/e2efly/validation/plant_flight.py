@@ -2,13 +2,14 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.policy.goal import Body
+from e2efly.policy.others import Others, nobody
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.law_step import LawMemory, LawStep, air_of, arrived, observed
 from e2efly.validation.plant import Delay, Plant, RigidState
@@ -67,6 +68,10 @@ class Trajectory:
     """Moments between control steps, if they were requested."""
 
 
+Flying = Generator[RigidState, Sequence[RigidState], Trajectory]
+"""A flight, step by step."""
+
+
 def fly(
     runtime: Runtime,
     plant: Plant,
@@ -97,6 +102,43 @@ def fly(
     Raises:
         ValueError: for a start, duration or latency that cannot be flown.
     """
+    (flown,) = together([flying(runtime, plant, start, duration, latency, air, sample, images, law)])
+    return flown
+
+
+def together(flights: Sequence[Flying]) -> list[Trajectory]:
+    """Fly several vehicles of a world in lockstep, each on its own plant: they see each other, and do not touch.
+
+    It ends when all have ended. One that has ended stays where it was.
+    """
+    now, ended = [next(flight) for flight in flights], dict[int, Trajectory]()
+    while len(ended) < len(flights):
+        before = list(now)
+        for i, flight in enumerate(flights):
+            if i in ended:
+                continue
+            rest = [state for j, state in enumerate(before) if j != i]
+            try:
+                now[i] = flight.send(rest)
+            except StopIteration as end:
+                ended[i] = end.value
+    return [ended[i] for i in range(len(flights))]
+
+
+def flying(
+    runtime: Runtime,
+    plant: Plant,
+    start: RigidState,
+    duration: float,
+    latency: float,
+    air: Air | None = None,
+    sample: float | None = None,
+    images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
+    law: LawStep | None = None,
+) -> Flying:
+    """The flight of `fly`, which gives its state before each control step, and is sent those of all others. Among
+    others it goes on when its task is done, as it is in their way.
+    """
     contract = runtime.policy.contract
     period = 1 / contract.control_rate_hz
     steps = math.ceil(duration / period - 1e-6) if math.isfinite(duration) else 0
@@ -112,6 +154,7 @@ def fly(
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
         now, then = k * period, (k + 1) * period
+        rest = yield states[-1]
         try:
             truth = states[-1].odometry(now)
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
@@ -120,8 +163,9 @@ def fly(
                 seen, felt = observed(law.at(k), felt, truth if seen is None else seen, period)
                 measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
             shown = () if images is None else images(k, states)
-            memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown)
-            if memory.done or memory.failure:
+            others = nearest(states[-1], rest, runtime.course.goal.neighbours) if rest else None
+            memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown, others=others)
+            if memory.failure or (memory.done and not rest):
                 break
             command = decision.command
             if law is not None and felt is not None:
@@ -159,6 +203,19 @@ def fly(
         fault=fault,
         samples=tuple(samples),
     )  # fmt: skip
+
+
+def nearest(own: RigidState, rest: Sequence[RigidState], count: int) -> Others | None:
+    """The nearest others as a policy observes them, filled up with `nobody`. None for a policy that observes none."""
+    if not count:
+        return None
+    near = sorted(rest, key=lambda other: float(np.linalg.norm(other.position - own.position)))[:count]
+    absent = nobody(own.position[None], count - len(near))
+    there = ([getattr(other, name) for other in near] for name in ("position", "velocity"))
+    position, velocity = (np.array(x).reshape(1, -1, 3) for x in there)
+    return Others(
+        np.concatenate([position, absent.position], axis=1), np.concatenate([velocity, absent.velocity], axis=1)
+    )
 
 
 def imu_of(before: Body, after: Body, dt: float) -> Imu:

@@ -90,6 +90,11 @@ def stress(
     report: dict[str, dict[str, Verdicts]] = {row: {} for row in chosen}
     for name, suite in suites.items():
         env = found.environment(suite)
+        if env.agents > 1:
+            raise ValueError(
+                f"task.agents is {env.agents}; accepted for --stress: a task with one vehicle in a world (without it, "
+                "`e2efly validate` flies worlds of several)"
+            )
         starts = draw_starts(env, episodes, seed)
         steps = env.episode_steps
         begins = list(zip(starts.states, starts.courses, strict=True))

@@ -192,6 +192,8 @@ def validate(
     longest = max(float(suite.episode_s) for suite in suites.values())
     kept = ROW + KEPT * int(longest * found.policy.contract.control_rate_hz)
     kept += 0 if log is None else 4 * KEPT * int(longest / SAMPLE)
+    agents = max(found.environment(suite).agents for suite in suites.values())
+    episodes = -(-episodes // agents) * agents  # whole worlds
     trained, _, _ = fly_criteria(found.at_home, episodes, seed, kept)
     criteria = {}
     for criterion, suite in suites.items():
@@ -199,7 +201,7 @@ def validate(
         starts = draw_starts(env, episodes, seed)
         sample = None if log is None else SAMPLE
         mission = FleetMission(
-            found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample, baseline
+            found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample, baseline, agents
         )
         begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
         asked = [FleetFlight(start, course, reality, sight) for start, course, sight in begins]

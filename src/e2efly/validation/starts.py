@@ -56,6 +56,11 @@ class Starts:
         """
         if not env.cameras:
             return [None] * len(self)
+        if env.agents > 1:
+            raise ValueError(
+                f"task.agents is {env.agents} and the policy sees images; accepted: one vehicle in a world, as the "
+                "images of a flight on a plant do not show others (`e2efly eval` does)"
+            )
         cameras, eyes = env.cameras, self.eyes
         if changed is not None:
             cameras, eyes = with_noise(cameras), changed.eyes(cameras, eyes, env.control_period)
@@ -72,14 +77,11 @@ def draw_starts(env: Env, n: int, seed: int) -> Starts:
     """The first `n` starts of a seed. They are those of `e2efly eval`.
 
     Raises:
-        ValueError: for a task whose worlds have several vehicles: a plant flies one alone.
+        ValueError: for a number of vehicles that is not that of whole worlds.
     """
-    if env.agents > 1:
-        raise ValueError(
-            f"task.agents is {env.agents}; accepted: a task with one vehicle in a world, as a plant flies one alone "
-            "(`e2efly eval` flies worlds of several)"
-        )
-    drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
+    if n % env.agents:
+        raise ValueError(f"{n} starts; accepted: a multiple of {env.agents}, the vehicles of a world")
+    drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // env.whole(BATCH)))]
     vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)
     states = tuple(RigidState(*(x[i].astype(np.float64) for x in fields)) for i in range(n))
@@ -91,7 +93,7 @@ def draw_starts(env: Env, n: int, seed: int) -> Starts:
 
 @jax.jit
 def _draw(env: Env, key: Array) -> tuple[State, Any, tuple[Eye, ...]]:
-    state = env.reset(key, BATCH)[0]
+    state = env.reset(key, env.whole(BATCH))[0]
     return state.vehicle, state.memory, state.eyes
 
 

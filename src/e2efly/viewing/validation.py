@@ -105,12 +105,15 @@ def flown_again(found: Validation) -> dict[str, Pair]:
     pairs = {}
     for name, suite in flew.task.criteria().items():
         v = found.criteria[name]
-        shown = [int(i) for i in np.argsort(v.flown.success, kind="stable")[:DRAWN]]
         home = Reality(nominal, contract.latency_of(nominal))
         env = flew.at_home.environment(suite)
+        worlds = np.argsort(v.flown.success[:: env.agents], kind="stable")[: max(DRAWN // env.agents, 1)]
+        shown = [int(world) * env.agents + i for world in worlds for i in range(env.agents)]
         sights = v.starts.sights(env, found.seed)
         asked = [FleetFlight(v.starts.states[i], v.starts.courses[i], home, sights[i]) for i in shown]
-        mission = FleetMission(flew.file, "simulator", nominal, nominal, float(suite.episode_s), baseline=flew.baseline)
+        mission = FleetMission(
+            flew.file, "simulator", nominal, nominal, float(suite.episode_s), baseline=flew.baseline, agents=env.agents
+        )
         again = fly_all(mission, asked, processes=1)
         verdicts = judge(env, v.starts.of(shown), again)
         there = [v.flights[i] for i in shown]

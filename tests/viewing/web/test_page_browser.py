@@ -203,12 +203,6 @@ def test_a_page_flies_any_task(name: str, race_page: Opened, monkeypatch: pytest
     flies_as_python_does(race_page, env, task, np.tile(np.asarray(env.hover), (30, 1)))
 
 
-def test_a_world_of_several_vehicles_is_refused() -> None:
-    task = TASKS["swap"]()
-    with pytest.raises(ValueError, match=r"task\.agents is 8; accepted: a task with one vehicle in a world"):
-        course(still(Env.of(task, RewardConfig({"prog2": 1.0}))), task, starts=2)
-
-
 def flies_as_python_does(page: Opened, env: Env, task: TaskConfig, actions: np.ndarray) -> None:
     """The first start, under given actions."""
     steps = len(actions)

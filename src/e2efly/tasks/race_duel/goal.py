@@ -32,11 +32,17 @@ class RaceDuelGoal(Racing):
 
     config: RaceDuelConfig
     shape: Shape
-    race: RaceGoal
-    """The same race without the others."""
+    track: Gates
+    closed: bool
+    """Whether the first gate follows the last."""
     control_period: float
     checks: int
     """Number of collision checks per control step."""
+
+    @property
+    def race(self) -> RaceGoal:
+        """The same race without the others."""
+        return RaceGoal(self.config, self.shape, self.track, self.closed)
 
     @property
     def neighbours(self) -> int:
@@ -94,7 +100,6 @@ class RaceDuelRoute(GatesRoute):
         """The course along the track, from its start and with its heading."""
         track = self._track()
         config = dataclasses.replace(RaceDuelConfig(), laps=self.laps)
-        race = RaceGoal(config, shape, Gates.of(track), track.closed)
-        goal = RaceDuelGoal(config, shape, race, control_period, 1)
+        goal = RaceDuelGoal(config, shape, Gates.of(track), track.closed, control_period, 1)
         memory = RaceDuelMemory(np.zeros(1, int), nobody(track.start[None], goal.neighbours))
         return self._placed(goal, memory, track)

@@ -40,13 +40,13 @@ class RaceDuelWorld(RaceDuelMemory):
 
 
 @partial(
-    jax.tree_util.register_dataclass, data_fields=["config", "shape", "race"], meta_fields=["control_period", "checks"]
+    jax.tree_util.register_dataclass,
+    data_fields=["config", "shape", "track"],
+    meta_fields=["closed", "control_period", "checks"],
 )
 @dataclass(frozen=True)
 class RaceDuel(RaceDuelGoal):
     """Make it with `RaceDuel.of`."""
-
-    race: Race
 
     @classmethod
     def of(cls, config: RaceDuelConfig, shape: Shape, control_period: float, checks: int = 1) -> "RaceDuel":
@@ -64,7 +64,12 @@ class RaceDuel(RaceDuelGoal):
                 f"{(first - CLEAR - config.position) / (config.agents - 1):.2f} m, so that the places of "
                 f"{config.agents} racers are in front of the first gate, {first:.2f} m from the start"
             )
-        return cls(race.config, shape, race, control_period, checks)
+        return cls(race.config, shape, race.gates, race.closed, control_period, checks)
+
+    @property
+    def race(self) -> Race:
+        """The same race without the others."""
+        return Race(self.config, self.shape, self.track, self.closed)
 
     @property
     def agents(self) -> int:

@@ -92,7 +92,7 @@ def read_report(path: Path) -> tuple[list[ShownReport], Vehicle]:
         if criterion not in pairs:
             raise ValueError(f"{flights_file(path)} has no flights of {criterion}; {accepted}")
         pair, env = pairs[criterion], flew.environment(suite)
-        starts = draw_starts(env, int(pair.starts.max(initial=0)) + 1, told.seed)
+        starts = draw_starts(env, env.whole(int(pair.starts.max(initial=0)) + 1), told.seed)
         _check(path, content["criteria"], criterion, pair, starts)
         scene = env.task.scene(starts.memory)
         for row, number in enumerate(pair.starts.tolist()):

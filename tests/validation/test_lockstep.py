@@ -1,0 +1,49 @@
+"""Several vehicles of a world on plants, in lockstep."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from e2efly.environment import UNSEEN, random_key
+from e2efly.environment.episodes import trace
+from e2efly.policy.others import FAR
+from e2efly.validation.evaluation import SEED, act_of
+from e2efly.validation.plant import RigidState
+from e2efly.validation.plant_flight import nearest
+from e2efly.validation.plant_stress import stress
+from e2efly.validation.plant_validation import validate
+
+
+def at(x: float) -> RigidState:
+    return RigidState(np.array([x, 0.0, 1.0]), np.array([-x, 0.0, 0.0]), np.eye(4)[0], np.zeros(3))
+
+
+def test_the_nearest_come_first_and_who_is_not_there_is_far() -> None:
+    found = nearest(at(0.0), [at(3.0), at(-1.0), at(2.0)], 2)
+    assert found is not None
+    np.testing.assert_array_equal(found.position[0, :, 0], [-1.0, 2.0])
+    np.testing.assert_array_equal(found.velocity[0, :, 0], [1.0, -2.0])
+    few = nearest(at(0.0), [at(3.0)], 2)
+    assert few is not None and few.position[0, 1, 2] == 1.0 + FAR
+    assert nearest(at(0.0), [at(3.0)], 0) is None
+
+
+def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[..., Path]) -> None:
+    """What each observes of the others, too."""
+    found = validate(policy_of("swap"), "simulator", 3, task={"agents": 4, "side": 4.0, "episode_s": 3.0})
+    compared, (suite,) = found.criteria["swap"], found.candidate.task.criteria().values()
+    assert len(compared.flights) == 4  # a whole world
+    env = found.candidate.at_home.environment(suite)
+    n = env.whole(250)
+    states, _, _, out = trace(env, act_of(found.candidate.policy), random_key(SEED, UNSEEN, 0), n, 60)
+    for i, flight in enumerate(compared.flights):
+        assert not flight.fault
+        np.testing.assert_allclose(flight.position[1:61], states.position[:, i], atol=2e-3)
+        np.testing.assert_allclose(flight.observation[1:61], out.final_observation[:, i], atol=2e-2)
+
+
+def test_worlds_of_several_are_refused_where_one_flies_alone(policy_of: Callable[..., Path]) -> None:
+    with pytest.raises(ValueError, match=r"task.agents is 8; accepted for --stress: a task with one vehicle"):
+        stress(policy_of("swap"), "simulator", 1)
