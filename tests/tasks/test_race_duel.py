@@ -38,6 +38,18 @@ def test_racers_start_behind_each_other_in_random_order() -> None:
     assert near.min() > 2 * env.task.shape.radius
 
 
+def test_scattered_racers_start_in_front_of_different_gates() -> None:
+    env = environment(scattered=1.0, laps=0)
+    state, _ = env.reset(random_key(0, 0, 0), 32)
+    gates, passed = env.task.track, np.asarray(state.memory.passed)
+    before = np.asarray(gates.position)[passed] - np.asarray(state.vehicle.position)
+    axis = np.stack([gates.cos[passed], gates.sin[passed], np.zeros(32)], axis=-1)
+    np.testing.assert_allclose(np.sum(before * axis, axis=1), 1.5, atol=0.31)
+    assert np.all(passed[::2] != passed[1::2]) and set(passed.tolist()) == set(range(gates.count))
+    (judged,) = RaceDuelConfig(scattered=1.0).criteria().values()
+    assert judged.scattered == 0
+
+
 def test_a_racer_sees_the_race_and_the_other() -> None:
     env = environment()
     alone = Env.of(RaceConfig(), RewardConfig({"prog1": 1.0}), EnvConfig())

@@ -9,6 +9,7 @@ import pytest
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import trace
 from e2efly.policy.others import FAR
+from e2efly.validation.duels import duel
 from e2efly.validation.evaluation import SEED, act_of
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import nearest
@@ -47,3 +48,16 @@ def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[...,
 def test_worlds_of_several_are_refused_where_one_flies_alone(policy_of: Callable[..., Path]) -> None:
     with pytest.raises(ValueError, match=r"task.agents is 8; accepted for --stress: a task with one vehicle"):
         stress(policy_of("swap"), "simulator", 1)
+
+
+def test_two_policies_race(policy_of: Callable[..., Path]) -> None:
+    """Each is given what it observes: the rival sees no others, and more of its last actions."""
+    policy, rival = str(policy_of("race_duel")), str(policy_of("race", past_actions=3))
+    there = duel(policy, rival, 4, task={"laps": 1, "episode_s": 3.0}, seed=1)
+    assert there.time.shape == (4, 2) and np.all(there.touched[:, 0] == there.touched[:, 1])
+    alike = duel(policy, policy, 4, task={"laps": 1, "episode_s": 3.0}, seed=1)
+    np.testing.assert_array_equal(there.out, alike.out)  # the hand-made controller reads neither
+    with pytest.raises(ValueError, match=r"--rival observes position_error \(3\); accepted: gates \(6\), others"):
+        duel(policy, str(policy_of("hover")), 4)
+    with pytest.raises(ValueError, match=r"--rival is given for a policy of hover; accepted: a policy of race_duel"):
+        duel(str(policy_of("hover")), policy, 4)

@@ -9,11 +9,13 @@ import jax
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
+from e2efly.config import RewardConfig
 from e2efly.config.changes import changed
 from e2efly.courses.tracks import load_track
 from e2efly.environment import UNSEEN, Env, random_key
 from e2efly.environment.episodes import Act, wilson
 from e2efly.policy.contract import Contract
+from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.simulation.device import wide_vectors
 from e2efly.validation.evaluation import SEED, act_of, candidate
 
@@ -90,8 +92,10 @@ def duel(
     laps = LAPS if load_track(asked.track).closed else 1
     flown = changed(asked, {"laps": laps, "episode_s": LONGEST} | dict(task or {}), "task")
     (suite,) = flown.criteria().values()
-    env = found.environment(dataclasses.replace(suite, collisions_end=False))
     racers = (found.policy, other.policy)
+    seen = dataclasses.replace(found.env, past_actions=max(racer.contract.past_actions for racer in racers))
+    flies = None if found.draws else found.flown
+    env = Env.of(dataclasses.replace(suite, collisions_end=False), RewardConfig({"prog2": 1.0}), seen, flown=flies)
     columns = [_columns(env, racer.contract, found.policy.contract) for racer in racers]
     parts, size = [], env.agents * min(WORLDS, races)
     for i in range(-(-races // WORLDS)):
@@ -100,18 +104,20 @@ def duel(
     return Duels(*(np.concatenate(x)[:races] for x in zip(*parts, strict=True)))
 
 
-def _columns(env: Env, rival: Contract, own: Contract) -> np.ndarray:
-    """The entries of the observation that a rival observes, in its order."""
+def _columns(env: Env, racer: Contract, own: Contract) -> np.ndarray:
+    """The entries of the observation that a racer observes, in its order."""
     ends = np.cumsum([field.size for field in env.fields])
-    there = {(f.name, f.size): np.arange(end - f.size, end) for f, end in zip(env.fields, ends, strict=True)}
-    if lacking := [field.name for field in rival.observation if (field.name, field.size) not in there]:
-        raise ValueError(f"--rival observes {', '.join(lacking)}; accepted: {', '.join(f.name for f in env.fields)}")
-    for name in ("control_rate_hz", "past_actions", "action"):
-        if getattr(rival, name) != getattr(own, name):
+    there = {field.name: np.arange(end - field.size, end) for field, end in zip(env.fields, ends, strict=True)}
+    there[PAST_ACTIONS] = there.get(PAST_ACTIONS, np.arange(0))[: 4 * racer.past_actions]  # the newest are the first
+    if wrong := [f"{f.name} ({f.size})" for f in racer.observation if len(there.get(f.name, ())) != f.size]:
+        offered = ", ".join(f"{f.name} ({f.size})" for f in env.fields)
+        raise ValueError(f"--rival observes {', '.join(wrong)}; accepted: {offered}")
+    for name in ("control_rate_hz", "action"):
+        if getattr(racer, name) != getattr(own, name):
             raise ValueError(
-                f"{name} of --rival is {getattr(rival, name)}; accepted: that of the policy, {getattr(own, name)}"
+                f"{name} of --rival is {getattr(racer, name)}; accepted: that of the policy, {getattr(own, name)}"
             )
-    return np.concatenate([there[field.name, field.size] for field in rival.observation])
+    return np.concatenate([there[field.name] for field in racer.observation])
 
 
 def _raced(

@@ -20,7 +20,14 @@ class RaceDuelConfig(RaceConfig):
     paper: ClassVar[Paper | None] = None
     variants: ClassVar = ()
     asked: ClassVar = {}
-    robust: ClassVar = {}
+    robust: ClassVar = {
+        "bptt": dataclasses.replace(
+            RaceConfig.robust["bptt"],
+            weights={"progway": 1.0, "fitlog": 4.0, "anglev_sq": 0.001, "act2_sq": 0.01, "apart": 2.0},
+            parameters={"fitlog_margin": 0.1, "apart_reach": 0.4},
+            steps=14_000_000,
+        )
+    }
     identified: ClassVar = {}
     family: ClassVar = {}
 
@@ -33,18 +40,22 @@ class RaceDuelConfig(RaceConfig):
     spacing: float = number(1.0, above=0)
     """Distance of each place of start in front of the one after it, m. The last one is the track's. They are in turn to
     the left and to the right of the line by half of it."""
+    scattered: float = number(0.0, low=0, high=1)
+    """Share of the worlds in which each racer starts in front of a gate of its own, anywhere on the track. A policy
+    that has only met itself, one place behind, knows no racer that is far away, or slower."""
     collisions_end: bool = True
     """Whether a touch of two racers ends the episode of the whole world. In training it does not, so that the policy
     learns from what follows."""
 
     @classmethod
     def training(cls) -> "RaceDuelConfig":
-        """Lap after lap, and no touch of two racers ends the episode."""
-        return cls(laps=0, collisions_end=False)
+        """Lap after lap, in half of the worlds from anywhere, and no touch of two racers ends the episode."""
+        return cls(laps=0, collisions_end=False, scattered=0.5)
 
     def criteria(self) -> dict[str, TaskConfig]:
-        """One lap, or the requested number of laps, for all racers of a world."""
-        return {self.name: dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)}
+        """One lap, or the requested number of laps, for all racers of a world, from the places of start."""
+        judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True, scattered=0.0)
+        return {self.name: judged}
 
     def check(self, control_rate: float, feet_height: float) -> None:
         """The track is one for all, and the starts have space."""

@@ -12,12 +12,15 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.policy.goal import Outcome, Shape
 from e2efly.policy.others import Others
 from e2efly.simulation.physics import State
+from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks import company
 from e2efly.tasks.race.world import Race
 from e2efly.tasks.race_duel import RaceDuelConfig
 from e2efly.tasks.race_duel.goal import RaceDuelGoal, RaceDuelMemory
 
+BEFORE = 1.5
+"""Distance in front of a gate at which a racer starts that does not start at the track's start, m."""
 CLEAR = 1.0
 """Distance of the first place of start from the first gate, m."""
 
@@ -77,9 +80,11 @@ class RaceDuel(RaceDuelGoal):
         return self.config.agents
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, RaceDuelWorld]:
-        """At rest behind each other, in random order, each in a ball around its place."""
-        a, c = self.agents, self.config
-        grid_key, key = jax.random.split(key)
+        """At rest behind each other, in random order, each in a ball around its place. In the worlds that are
+        scattered, in front of different gates.
+        """
+        a, c, g = self.agents, self.config, self.track
+        grid_key, key, scatter_key = jax.random.split(key, 3)
         state, passed = self.race.start(key, n)
         keys = jax.random.split(grid_key, n // a)
         order = jax.vmap(lambda k: jax.random.permutation(k, a))(keys).reshape(n)
@@ -87,7 +92,16 @@ class RaceDuel(RaceDuelGoal):
         yaw = jnp.asarray(self.race.gates.start_yaw)
         cos, sin = jnp.cos(yaw), jnp.sin(yaw)
         moved = jnp.stack([ahead * cos - left * sin, ahead * sin + left * cos, jnp.zeros(n)], axis=-1)
-        state = dataclasses.replace(state, position=state.position + moved)
+        keys = jax.random.split(scatter_key, n // a)
+        chance = jax.vmap(lambda k: jax.random.uniform(k, (g.count + 1,)))(keys)
+        gate = jnp.argsort(chance[:, 1:], axis=1)[:, jnp.arange(a) % g.count].reshape(n)
+        anywhere = jnp.repeat(chance[:, 0] < c.scattered, a)
+        axis = jnp.stack([jnp.asarray(g.cos)[gate], jnp.asarray(g.sin)[gate], jnp.zeros(n)], axis=-1)
+        there = jnp.asarray(g.position)[gate] - BEFORE * axis - jnp.asarray(g.start)
+        turned = jnp.where(anywhere, jnp.arctan2(axis[:, 1], axis[:, 0]), yaw)
+        zero, passed = jnp.zeros(n), jnp.where(anywhere, gate, passed)
+        position = state.position + jnp.where(anywhere[:, None], there, moved)
+        state = dataclasses.replace(state, position=position, quaternion=from_euler(zero, zero, turned))
         others, bodies = company.nearest(state, a, c.neighbours), company.all_others(state, a)
         no = jnp.zeros(n, bool)
         return state, RaceDuelWorld(passed, others, bodies, jnp.zeros(n), no, no, no)
