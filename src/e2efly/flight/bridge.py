@@ -438,7 +438,8 @@ class Bridge:
         keeper.problem = None if flight.mode in GROUNDED else keeper.problem
         keeper.see(odometry, now, flying=self.flying and self.height > LIFTED and not flight.misled)
         if self.decision is not None and command is not None and odometry is not None:
-            command = keeper.keep(odometry, now, command, floor=not self.inputs.policy_lands)
+            others = () if self.neighbours is None else self.neighbours.balls(now)
+            command = keeper.keep(odometry, now, command, floor=not self.inputs.policy_lands, others=others)
             if command is None:
                 stop = (0.0, 0.0, 0.0, yaw_of(odometry.quaternion))
                 source, command = "hover", controlled(self.gentle, "velocity", odometry, stop)

@@ -9,7 +9,7 @@ and Chen et al., Backup control barrier functions, 2021). The manoeuvre's path i
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from typing import Any
@@ -31,8 +31,9 @@ from e2efly.flight.filter.forecast import (
     measured,
 )
 from e2efly.flight.filter.judgement import judged
-from e2efly.flight.filter.margins import NAMES, MarginLimits, near, rooms
+from e2efly.flight.filter.margins import NAMES, MarginLimits, halves, near, rooms
 from e2efly.flight.filter.native import SOLIDS, Native
+from e2efly.flight.pose.neighbours import OtherVehicle
 from e2efly.flight.settings import Fence
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.gravity import GRAVITY
@@ -294,15 +295,18 @@ def _reading(rate: tuple[float, float, float], at: float, before: tuple[float, A
 
 
 def filtered(
-    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: ForecastCommand, *, floor: bool = True
-) -> Filtered:
+    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: ForecastCommand, *,
+    floor: bool = True, others: Sequence[OtherVehicle] = (),
+) -> Filtered:  # fmt: skip
     """The command nearest to the wanted one that keeps all limits. `memory` is that after `watch`. `now` is in s.
     `wanted` has floats or (n,) each, within the vehicle's limits. `floor` tells whether the lowest height of the fence
-    counts.
+    counts. `others`: the other vehicles now; only for a single vehicle.
     """
     xp = _apart(odometry.position)[0]
     m = forecast(filter, memory, odometry, now)
     solids = near(filter.limits, m, _reach(m)) if filter.limits.solids else ()
+    if others:
+        solids += halves(filter.limits, m, others, filter.latency, _reach(m))
     if filter.native is not None and xp is SCALARS and len(solids) <= SOLIDS:
         found = filter.native.judge(m, memory.air, wanted, solids, floor)
     else:

@@ -1,6 +1,7 @@
 """The filter as the bridge uses it, with the command and odometry types of the rest of `flight`."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from e2efly.control import Ctbr, Vec3
 from e2efly.flight.filter.filter import Filter, FilterMemory, feel, filtered, remember, watch
 from e2efly.flight.filter.forecast import ForecastCommand
+from e2efly.flight.pose.neighbours import OtherVehicle
 from e2efly.policy.odometry import Odometry
 
 
@@ -31,17 +33,19 @@ class FilterError(Exception):
 
 
 def keep(
-    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool = True
-) -> tuple[Ctbr, CommandChange | None]:
+    filter: Filter, memory: FilterMemory, odometry: Odometry, now: float, wanted: Ctbr, *,
+    floor: bool = True, others: Sequence[OtherVehicle] = (),
+) -> tuple[Ctbr, CommandChange | None]:  # fmt: skip
     """The command to send, and how it was changed. It is the wanted command itself if that keeps all limits. `memory`
-    is that after `watch`. `now` is in s. `floor` tells whether the lowest height of the fence counts.
+    is that after `watch`. `now` is in s. `floor` tells whether the lowest height of the fence counts. `others`: the
+    other vehicles now.
 
     Raises:
         FilterError: if a number is not finite.
     """
     told = _told(wanted)
     try:
-        found = filtered(filter, memory, odometry, now, told, floor=floor)
+        found = filtered(filter, memory, odometry, now, told, floor=floor, others=others)
     except (ValueError, ArithmeticError) as error:
         raise FilterError(f"filter: {error}") from error
     if not all(map(math.isfinite, (*found.command, found.room))):
@@ -79,12 +83,14 @@ class Keeper:
         if all(map(math.isfinite, (x, y, z))):
             self.memory = feel(self.memory, (x, y, z), asked)
 
-    def keep(self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool) -> Ctbr | None:
+    def keep(
+        self, odometry: Odometry, now: float, wanted: Ctbr, *, floor: bool, others: Sequence[OtherVehicle] = ()
+    ) -> Ctbr | None:
         """The command in place of a policy's command, with the arguments of the function `keep`. None: it failed, and
         `problem` says why.
         """
         try:
-            command, self.change = keep(self.filter, self.memory, odometry, now, wanted, floor=floor)
+            command, self.change = keep(self.filter, self.memory, odometry, now, wanted, floor=floor, others=others)
         except FilterError as error:
             self.problem = str(error)
             return None

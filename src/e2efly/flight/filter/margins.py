@@ -1,6 +1,7 @@
 """How much room the backup manoeuvre leaves to the fence's walls, to solids, and to the largest speed and tilt."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ from e2efly.flight.filter.backup import TILT_MARGIN, TIMING, TURNING, WAY_GAINS,
 from e2efly.flight.filter.backup_path import Way, run_out, way
 from e2efly.flight.filter.forecast import ForecastMotion, Residual
 from e2efly.flight.filter.obstacle import Obstacle, Plane, obstacles
+from e2efly.flight.pose.neighbours import OtherVehicle
 from e2efly.flight.settings import Fence
 
 SPEED_MARGIN, SPEED_S = 0.7, 0.25
@@ -63,6 +65,35 @@ def near(limits: MarginLimits, m: ForecastMotion, reach: float) -> tuple[Plane, 
     """
     found = (solid.plane(m.px, m.py, m.pz, reach + limits.radius) for solid in limits.solids)
     return tuple(plane._replace(gap=plane.gap - limits.radius) for plane in found if plane is not None)
+
+
+def halves(
+    limits: MarginLimits, m: ForecastMotion, others: Sequence[OtherVehicle], ahead: float, reach: float
+) -> tuple[Plane, ...]:
+    """The sides of the half of the space that is the vehicle's own: each other is given the half beyond the middle.
+
+    Where both keep to theirs, they do not meet: the room between them is the sum of what both need to stop (buffered
+    Voronoi cells; Zhou, Wang, Bandyopadhyay and Schwager 2017). One that does not keep to its half has only this half
+    to fly into.
+
+    Args:
+        limits: the radius and the margin of the vehicle.
+        m: its state when the command begins to act.
+        others: the others.
+        ahead: time until then, s, in which they fly straight on.
+        reach: the planes within this distance, m, are returned.
+    """
+    found = []
+    for other in others:
+        x, y, z = (
+            p + ahead * v - own for p, v, own in zip(other.position, other.velocity, (m.px, m.py, m.pz), strict=True)
+        )
+        away = math.sqrt(x * x + y * y + z * z)
+        gap = 0.5 * (away - other.ball) - limits.radius
+        if gap <= reach:
+            nx, ny, nz = (x / away, y / away, z / away) if away > 0.0 else (1.0, 0.0, 0.0)
+            found.append(Plane(nx, ny, nz, gap, "another vehicle"))
+    return tuple(found)
 
 
 def rooms(

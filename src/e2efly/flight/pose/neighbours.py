@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,17 @@ LOST_S = 1.0
 """A policy's flight ends when one of the others has not been seen for this time, s."""
 LEAST = 0.05
 """Smallest distance at which another vehicle is shown, m: a direction stays."""
+
+
+class OtherVehicle(NamedTuple):
+    """Another vehicle now."""
+
+    position: tuple[float, float, float]
+    """World, m."""
+    velocity: tuple[float, float, float]
+    """World, m/s."""
+    ball: float = 0.0
+    """Radius of a ball about this position that surely contains its centre, m."""
 
 
 class Neighbours:
@@ -48,22 +60,30 @@ class Neighbours:
                 return f"another vehicle, by {source.describe()}, was {told}{why}; accepted: seen within {LOST_S:g} s"
         return None
 
-    def nearest(self, odometry: Odometry, now: float, count: int) -> Others:
-        """The `count` nearest others, for one vehicle, in the axes of its odometry.
-
-        They have flown on with their velocity. One that has not been seen for longer than usual is a ball, whose radius
-        grows by `FASTEST`: it is shown at the point of the ball that is nearest to the vehicle.
+    def balls(self, now: float) -> tuple[OtherVehicle, ...]:
+        """All that have been seen, where they are now. They have flown on with their velocity. One that has not been
+        seen for longer than usual is a ball, whose radius grows by `FASTEST`.
         """
         found = []
         for known in self._tracks:
-            if known.odometry is None:
-                continue
-            age = max(now - known.odometry.time, 0.0)
-            flown = min(age, self.max_age)
-            offset = known.odometry.position + flown * known.odometry.velocity - odometry.position
+            if known.odometry is not None:
+                age, motion = max(now - known.odometry.time, 0.0), known.odometry
+                place = motion.position + min(age, self.max_age) * motion.velocity
+                ball = FASTEST * max(age - self.max_age, 0.0)
+                found.append(OtherVehicle(tuple(place.tolist()), tuple(motion.velocity.tolist()), ball))
+        return tuple(found)
+
+    def nearest(self, odometry: Odometry, now: float, count: int) -> Others:
+        """The `count` nearest others, for one vehicle, in the axes of its odometry.
+
+        Of a ball, the point that is nearest to the vehicle is shown: see `balls`.
+        """
+        found = []
+        for other in self.balls(now):
+            offset = np.array(other.position) - odometry.position
             away = float(np.linalg.norm(offset))
-            shown = max(away - FASTEST * max(age - self.max_age, 0.0), min(away, LEAST))
-            found.append((shown, offset * (shown / max(away, 1e-9)), known.odometry.velocity))
+            shown = max(away - other.ball, min(away, LEAST))
+            found.append((shown, offset * (shown / max(away, 1e-9)), other.velocity))
         found.sort(key=lambda one: one[0])
         others = nobody(odometry.position[None], count)
         for i, (_, offset, speed) in enumerate(found[:count]):
