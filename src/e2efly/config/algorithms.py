@@ -164,6 +164,9 @@ class BPTTConfig(_FirstOrder):
     average: float | None = number(None, high=0.9999)
     """Largest weight of the old value in a running mean of the policy, per update. While there are few policies, their
     plain mean is used. The running mean is evaluated and exported. None: no mean (sets the program)."""
+    league: int = number(0, high=64, added=True, sets_shapes=True)
+    """Number of past selves that are kept as opponents, for tasks with several vehicles in a world: in every second
+    world, one of them flies all vehicles but the first (sets shapes)."""
 
 
 @register("shac")

@@ -25,6 +25,7 @@ from e2efly.learning.algorithm import (
     gradient_cuts,
     gradient_per_term,
 )
+from e2efly.learning.league import flown_by_opponents, founded, joined, opponent, seat
 from e2efly.learning.networks import Weights
 from e2efly.learning.rollout import RolloutState, StepRecord, advance
 
@@ -38,15 +39,24 @@ class BPTTParameters:
     """The weights that are judged and shipped: those of `learner`, or their running mean (`BPTTConfig.average`)."""
     learner: Weights
     """The weights that fly the windows and take the gradient steps."""
+    league: Any = None
+    """Past selves, each leaf (league, ...)."""
 
 
 class BPTT(Algorithm):
     """Back-propagation through time; see the module."""
 
     def init(self, env: Env, config: BPTTConfig, seed: int) -> BPTTParameters:
-        """A fresh network, made by NumPy."""
+        """A fresh network, made by NumPy.
+
+        Raises:
+            ValueError: for a league of a task with one vehicle in a world.
+        """
+        if config.league and env.agents == 1:
+            raise ValueError(f"algo.league is {config.league}; accepted: 0, or a task with several vehicles in a world")
         policy = self.actor.init(np.random.default_rng(seed), np.asarray(env.hover))
-        return BPTTParameters(policy, jax.tree.map(np.copy, policy))
+        members = founded(policy, config.league) if config.league else None
+        return BPTTParameters(policy, jax.tree.map(np.copy, policy), members)
 
     def optimizer(self, config: BPTTConfig, parameters: BPTTParameters) -> Any:
         """Adam's initial state."""
@@ -56,10 +66,14 @@ class BPTT(Algorithm):
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
         """One window and one gradient step."""
-        old, rate = state.parameters, annealed(config, progress)
+        old, rate, key = state.parameters, annealed(config, progress), state.key
+        newest, rival = seat(progress, max(config.league, 1)), None
+        if old.league is not None:
+            drawn, key = jax.random.split(key)
+            rival = opponent(old.league, drawn, newest)
 
         def gain(learner: Weights) -> tuple[dict[str, Array], Any]:
-            return self._window(env, config, learner, state, progress)
+            return self._window(env, config, learner, rival, state, progress)
 
         grads, (end, metrics), norms = gradient_per_term(gain, old.learner, config.term_gradients)
         learner, optimizer, norm = descend(config, rate, old.learner, state.optimizer, grads)
@@ -69,15 +83,22 @@ class BPTT(Algorithm):
             share = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
             policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         metrics |= {"loss/gradient_norm": norm, **norms}
-        return end.into(state, parameters=BPTTParameters(policy, learner), optimizer=optimizer), metrics
+        members = None if old.league is None else joined(old.league, learner, newest)
+        parameters = BPTTParameters(policy, learner, members)
+        return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
 
     def _window(
-        self, env: Env, config: BPTTConfig, learner: Weights, state: TrainState, progress: Float[Array, ""]
-    ) -> tuple[dict[str, Array], tuple[RolloutState, dict[str, Array]]]:
+        self, env: Env, config: BPTTConfig, learner: Weights, rival: Weights | None, state: TrainState,
+        progress: Float[Array, ""],
+    ) -> tuple[dict[str, Array], tuple[RolloutState, dict[str, Array]]]:  # fmt: skip
         def step(at: RolloutState, cut: Array) -> tuple[RolloutState, Any]:
             at = at.cut(cut) if config.horizon_start else at
             features = self.actor.features(at.observation, at.env.images)
             action, memory = self.actor(learner, features, at.memory)
+            if rival is not None:
+                theirs = flown_by_opponents(action.shape[0], env.agents)[:, None]
+                other, remembered = self.actor(rival, features, at.memory)
+                action, memory = jnp.where(theirs, other, action), jnp.where(theirs, remembered, memory)
             after, out = advance(env, config, at, action, memory, critic=False)
             record = StepRecord.of(out)
             parts = record.terms if config.term_gradients else {"reward": jnp.mean(out.reward)}
