@@ -77,7 +77,8 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     inputs: dict[str, tuple[int, ...]] = {INPUT: (sum(field.size for field in features.fields),)}
     inputs |= {name: image_shape(view.camera) for name, view in zip(images, features.views, strict=True)}
     memory = {MEMORY: (units,)} if units else {}
-    return graph.whole(inputs | memory, {OUTPUT: (len(weights.head[-1][1]),)} | ({NEXT_MEMORY: (units,)} if units else {}))
+    action = {OUTPUT: (len(weights.head[-1][1]),)}
+    return graph.whole(inputs | memory, action | ({NEXT_MEMORY: (units,)} if units else {}))
 
 
 def perceptron_graph(
