@@ -65,7 +65,7 @@ class HoverConfig(TaskConfig):
     lost_rotor: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "upright": 0.1, "anglevxy_sq": 0.02, "act2_sq": 0.05},
         algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
-        steps=2_500_000,
+        steps=4_000_000,
     )
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},

@@ -74,9 +74,9 @@ class LandConfig(TaskConfig):
     family: ClassVar = {"bptt": replace(robust["bptt"], steps=6_000_000, chunk=60)}
     lost_rotor: ClassVar = Robust(
         weights={"progxy": 0.3, "descent": 1.0, "upright": 2.0, "anglevxy_sq": 0.02, "act2_sq": 0.02},
-        parameters={"descent_cone": 10.0, "vz_min": 0.8, "vz_max": 1.3},
+        parameters={"descent_cone": 10.0, "vz_min": 1.0, "vz_max": 2.5},
         algo={"horizon": 96, "learning_rate": 6e-3, "average": 0.99},
-        steps=8_000_000,
+        steps=4_000_000,
         chunk=60,
     )
     paper: ClassVar = Paper(
@@ -143,7 +143,7 @@ class LandConfig(TaskConfig):
         """
         if not isinstance(config.algo, BPTTConfig):
             raise ValueError(f"preset {preset!r}: accepted for land by bptt; not by {config.algo.name}")
-        task = cls(episode_s=8.0, sideways=0.5, height=(4.0, 6.0), radius=5.0, speed=2.0, tilt=0.5, fence=8.0)
+        task = cls(episode_s=6.0, sideways=0.5, height=(3.0, 5.0), radius=5.0, speed=2.0, tilt=0.5, fence=8.0)
         env = EnvConfig(
             command_mode="rotor_share",
             control_rate=100.0,
