@@ -44,6 +44,7 @@ class Probe:
     fields = FIELDS
     control_period = 1.0
     hover = np.zeros(4, np.float32)
+    action_size = 4
     cameras = ()
 
     @property

@@ -192,17 +192,13 @@ def test_contract_of_hovering_on_vis_r() -> None:
 @pytest.mark.parametrize("mode", list(COMMAND_MODES))
 @pytest.mark.parametrize("vehicle", vehicle_names())
 def test_every_contract_is_valid_and_maps_as_the_environment_does(mode: str, vehicle: str) -> None:
-    if load_vehicle(vehicle).rotor_count != 4 and COMMAND_MODES[mode].controller is None:
-        with pytest.raises(ValueError, match=rf"command_mode is '{mode}' and vehicle '{vehicle}' has . rotors.*'ctbr'"):
-            configured(vehicle=vehicle, command_mode=mode)
-        return
     config, env = configured(vehicle=vehicle, command_mode=mode, control_rate=49.0, action_latency=(0.01, 0.03))
     contract = contract_of(env, config)
     assert Contract.from_json(contract.to_json()) == contract
     assert (contract.control_rate_hz, contract.latency_s, contract.latency_range_s) == (49.0, 0.02, (0.01, 0.03))
     low, high = np.array(contract.action.low), np.array(contract.action.high)
     for action in (-1.0, 0.3, 1.0):
-        command = np.asarray(env.command(np.full((1, 4), action, np.float32)))[0]
+        command = np.asarray(env.command(np.full((1, env.action_size), action, np.float32)))[0]
         np.testing.assert_allclose(command, low + (action + 1) / 2 * (high - low), rtol=1e-5, atol=1e-6)
 
 

@@ -291,7 +291,8 @@ BY_THE_PAPER = ("ppo", "bptt", "abpt")
     ("name", "task", "algo"),
     [("nominal", t, a) for t in TASKS for a in ALGORITHMS]
     + [(p, t, a) for p in ("paper", "authors") for t in TASKS if t not in NOT_IN_THE_PAPER for a in BY_THE_PAPER]
-    + [("thrown", "hover", a) for a in ALGORITHMS],
+    + [("thrown", "hover", a) for a in ALGORITHMS]
+    + [("lost_rotor", task, "bptt") for task in ("hover", "land")],
 )
 def test_every_preset_is_complete_and_survives_json(task: str, algo: str, name: str) -> None:
     config = presets.preset(task, algo, name)
@@ -309,6 +310,12 @@ def test_a_preset_that_the_paper_does_not_give_is_refused(task: str) -> None:
 def test_the_paper_does_not_train_by(algo: str) -> None:
     with pytest.raises(ValueError, match=f"the paper does not train by '{algo}'; accepted: ppo, bptt, abpt"):
         presets.preset("hover", algo, "paper")
+
+
+@pytest.mark.parametrize("task", ["hover", "land"])
+def test_a_lost_rotor_is_learned_by_bptt(task: str) -> None:
+    with pytest.raises(ValueError, match=f"preset 'lost_rotor': accepted for {task} by bptt; not by ppo"):
+        presets.preset(task, "ppo", "lost_rotor")
 
 
 def test_only_hover_starts_thrown() -> None:

@@ -23,7 +23,7 @@ def made(
     config = config or presets.preset("hover", "ppo")
     env = env or Env.of(config.task, config.reward, config.env)
     actor = Actor.of(env.fields, (), NetworkConfig((hidden,)))
-    layers = init_mlp(np.random.default_rng(0), (actor.features.size, hidden, 4), scale)
+    layers = init_mlp(np.random.default_rng(0), (actor.features.size, hidden, len(env.hover)), scale)
     if hovers:
         layers = [*layers[:-1], (np.asarray(layers[-1][0]), np.arctanh(np.asarray(env.hover, np.float32)))]
     export_policy(path, Weights((), None, layers), actor, contract_of(env, config))

@@ -229,15 +229,15 @@ def test_an_unknown_key_is_named_with_what_was_meant(path: Path) -> None:
         (("action", "low"), [-0.1, -10.0, -10.0, -4.0], "collective thrust, is [-0.1, 27.3]; accepted: from 0 or more"),
         (("action", "low"), [9.9, -10.0, -10.0, -4.0], "below 9.81 m/s^2, to more than it, which hovers"),
         (("action", "high"), [9.7, 10.0, 10.0, 4.0], "is [0.0, 9.7]; accepted: from 0 or more, below 9.81 m/s^2"),
-        (("action", "high"), [27.3, 10.0, 10.0, -4.0], "four numbers below action.high"),
+        (("action", "high"), [27.3, 10.0, 10.0, -4.0], "4 numbers below action.high"),
         (("action", "mode"), "rates", "'ctbr'"),
         (("action", "mode"), "velocity", "as action.mode is 'velocity'"),
         (("action", "units"), ["m/s^2", "deg/s", "deg/s", "deg/s"], "'rad/s'"),
         (("action", "low"), [0.0, -10.0, -10.0], "a list of 4 numbers"),
-        (("action", "low"), [0.0, 10.0, -10.0, -4.0], "four numbers below action.high"),
+        (("action", "low"), [0.0, 10.0, -10.0, -4.0], "4 numbers below action.high"),
         (("action", "limits"), [0.0, 1.0], "[-1.0, 1.0]"),
         (("action", "mapping"), "command = high * action", "command = low"),
-        (("hover_action",), [1.1, 0.0, 0.0, 0.0], "four numbers in [-1, 1]"),
+        (("hover_action",), [1.1, 0.0, 0.0, 0.0], "4 numbers in [-1, 1]"),
     ],
 )
 def test_a_value_out_of_range_is_refused(path: Path, value: Any, accepted: str) -> None:

@@ -68,6 +68,7 @@ BY_HAND = {
     "near": np.exp(-13) + 0.5 * np.exp(-8 * 13),
     "alive": 1,
     "anglev_sq": -9,
+    "anglevxy_sq": -5,
     "act2_sq": -0.25,
     "descent": -abs(0.5 / (1 + 25 / 0.09) - 6),
     "upright": -2 * 0.36,

@@ -79,8 +79,8 @@ def export(policy: Any, path: str | os.PathLike[str], env: Any = None) -> Path:
     layers, operators, most = _layers(policy)
     if (shown := layers[0][0].shape[0]) != stepper.size:
         raise ValueError(f"policy takes {shown} numbers; accepted: {stepper.size}, as its environment shows")
-    if (acts := layers[-1][0].shape[1]) != 4:
-        raise ValueError(f"policy returns {acts} numbers; accepted: 4, the commands of a quadrotor")
+    if (acts := layers[-1][0].shape[1]) != (wanted := stepper.env.action_size):
+        raise ValueError(f"policy returns {acts} numbers; accepted: {wanted}, the commands of the vehicle")
     if not all(np.isfinite(x).all() for layer in layers for x in layer):
         raise ValueError("policy has weights that are not finite; accepted: finite numbers (did the training diverge?)")
     graph = perceptron_graph(stepper.features, layers, operators, stepper.raw, _normal(normalize), most)

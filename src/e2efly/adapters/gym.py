@@ -42,9 +42,9 @@ def observation_space(stepper: Stepper) -> Space[Any]:
     return Dict(parts)
 
 
-def action_space() -> Box:
-    """The four commands of a policy, each in [-1, 1] (docs/decisions.md)."""
-    return Box(-1.0, 1.0, (4,), np.float32)
+def action_space(stepper: Stepper) -> Box:
+    """The commands of a policy, each in [-1, 1]: four, or one for each rotor (docs/decisions.md)."""
+    return Box(-1.0, 1.0, (stepper.env.action_size,), np.float32)
 
 
 class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
@@ -65,7 +65,7 @@ class QuadrotorEnv(gymnasium.Env[Any, np.ndarray]):
             ValueError: naming the field, the value and what is accepted.
         """
         self.stepper = Stepper(configured(task), 1, raw)
-        self.observation_space, self.action_space = observation_space(self.stepper), action_space()
+        self.observation_space, self.action_space = observation_space(self.stepper), action_space(self.stepper)
         self.render_mode, self.metadata = rendering(self.metadata, render_mode, self.stepper)
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
@@ -111,7 +111,8 @@ class QuadrotorVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self.num_envs = num_envs
         self.stepper = Stepper(configured(task), num_envs, raw)
         self.render_mode, self.metadata = rendering(self.metadata, render_mode, self.stepper)
-        self.single_observation_space, self.single_action_space = observation_space(self.stepper), action_space()
+        self.single_observation_space = observation_space(self.stepper)
+        self.single_action_space = action_space(self.stepper)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 

@@ -35,7 +35,7 @@ class QuadrotorParallelEnv(ParallelEnv[str, Observation, np.ndarray]):
         self.agents: list[str] = []
         self.render_mode, metadata = rendering(self.metadata, render_mode, self.stepper)
         self.metadata = metadata | {"name": f"e2efly_{config.task.name}_v0"}
-        self._observation_space, self._action_space = observation_space(self.stepper), action_space()
+        self._observation_space, self._action_space = observation_space(self.stepper), action_space(self.stepper)
         self._rng, _ = gymnasium.utils.seeding.np_random()
 
     def observation_space(self, agent: str) -> Space[Any]:
@@ -43,7 +43,7 @@ class QuadrotorParallelEnv(ParallelEnv[str, Observation, np.ndarray]):
         return self._observation_space
 
     def action_space(self, agent: str) -> Space[Any]:
-        """The four commands of an agent, each in [-1, 1]: the same for all."""
+        """The commands of an agent, each in [-1, 1]: the same for all."""
         return self._action_space
 
     def render(self) -> np.ndarray | None:

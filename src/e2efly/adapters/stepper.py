@@ -63,7 +63,7 @@ class Stepper:
         self.state, observation = self.begin(random_key(seed))
         return np.array(observation)
 
-    def step(self, action: Float[np.ndarray, "n 4"], restart: bool) -> tuple[Step, np.ndarray, np.ndarray]:
+    def step(self, action: Float[np.ndarray, "n c"], restart: bool) -> tuple[Step, np.ndarray, np.ndarray]:
         """Simulate one control step.
 
         Args:
@@ -80,8 +80,8 @@ class Stepper:
         """
         if self.state is None:
             raise RuntimeError("step before the first reset")
-        if np.shape(action) != (self.n, 4):
-            raise ValueError(f"actions have the shape {np.shape(action)}; accepted: {(self.n, 4)}")
+        if np.shape(action) != (wanted := (self.n, self.env.action_size)):
+            raise ValueError(f"actions have the shape {np.shape(action)}; accepted: {wanted}")
         self.state, out, shown, final = self._advance(self.state, np.asarray(action, np.float32), restart)
         return jax.tree.map(np.array, out), np.array(shown), np.array(final)  # copies: callers change them
 

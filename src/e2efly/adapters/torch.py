@@ -83,15 +83,15 @@ class TorchEnv:
     def step(self, state: TorchState, action: torch.Tensor) -> tuple[TorchState, TorchStep]:
         """Simulate one control step, with a new start where an episode ended.
 
-        The state comes from `reset` or the last step. Actions, (n, 4), are clipped to [-1, 1].
+        The state comes from `reset` or the last step. Actions, (n, c), are clipped to [-1, 1].
 
         Raises:
             ValueError: for actions of another shape or type.
         """
-        if tuple(action.shape) != (self.num_envs, 4) or action.dtype != torch.float32:
+        wanted = self.num_envs, self.stepper.env.action_size
+        if tuple(action.shape) != wanted or action.dtype != torch.float32:
             raise ValueError(
-                f"actions are {action.dtype} of shape {tuple(action.shape)}; accepted: torch.float32 of "
-                f"{(self.num_envs, 4)}"
+                f"actions are {action.dtype} of shape {tuple(action.shape)}; accepted: torch.float32 of {wanted}"
             )
         extra: dict[str, Any] = {}
         *moving, observation, reward = _Step.apply(self, state.rest, extra, action, *state.moving)  # pyright: ignore

@@ -250,6 +250,11 @@ class EnvConfig:
     cushion: float = number(0.0, high=3.0, added=True)
     """Additional thrust of a rotor near the ground z = 0, relative to the formula of Cheeseman and Bennett. 0: none
     (sets the program)."""
+    lost_rotor: float = number(0.0, high=1.0, added=True)
+    """Probability that an episode loses a rotor: any one of them stops, and neither the policy nor the flight
+    controller is told. 0: none does (sets the program)."""
+    lost_rotor_time: tuple[float, float] = number((0.5, 3.0), rising=True, added=True)
+    """Earliest and latest time of that, s since the start of the episode; drawn uniformly."""
     disturbance: DisturbanceConfig = DisturbanceConfig()
     """Gusts, uneven rotors, a sagging battery, an offset of the centre of mass, and drifting poses."""
     noise: NoiseConfig = NoiseConfig()

@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from e2efly.environment.disturbance import Disturbance
 from e2efly.environment.lost_commands import LostCommands
+from e2efly.environment.lost_rotor import LostRotor
 from e2efly.environment.pose_errors import PoseErrors
 from e2efly.simulation.physics import State
 from e2efly.simulation.sensors import imu
@@ -28,7 +29,7 @@ class EnvState:
     """The task's own state."""
     time: Float[Array, " n"]
     """Time since the start of the episode, s."""
-    actions: Float[Array, "n k 4"]
+    actions: Float[Array, "n k c"]
     """The policy's last actions, newest first."""
     action_latency: Float[Array, " n"]
     """Latency from observation to command, s."""
@@ -40,6 +41,8 @@ class EnvState:
     """The uniform random numbers that define each episode's vehicle, for a family."""
     disturbance: Disturbance | None
     """Gusts, rotors, sag and drift."""
+    lost_rotor: LostRotor | None
+    """The rotor that stops."""
     estimate: PoseErrors | None
     """The errors of the observed state."""
     link: LostCommands | None

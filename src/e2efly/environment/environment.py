@@ -31,7 +31,7 @@ from e2efly.config import (
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
 from e2efly.control.vectors import unrotate
-from e2efly.environment import air, disturbance, expert, lost_commands, pose_errors
+from e2efly.environment import air, disturbance, expert, lost_commands, lost_rotor, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
 from e2efly.environment.env_state import (
@@ -87,8 +87,8 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     jax.tree_util.register_dataclass,
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
-        "observation_latency_range", "randomize", "posterior", "wind", "downwash", "cushion", "disturbance",
-        "estimate", "link", "noise", "imu", "cameras",
+        "observation_latency_range", "randomize", "posterior", "wind", "downwash", "cushion", "lost_rotor",
+        "lost_rotor_time", "disturbance", "estimate", "link", "noise", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
 )  # fmt: skip
@@ -118,6 +118,10 @@ class Env:
     """See `EnvConfig`; None: there is none."""
     cushion: Any
     """See `EnvConfig`; None: there is none."""
+    lost_rotor: Any
+    """Probability that an episode loses a rotor; None: none does."""
+    lost_rotor_time: Float[Array | np.ndarray, "2"] | None
+    """Earliest and latest time of that, s; None likewise."""
     disturbance: DisturbanceConfig | None
     estimate: EstimateConfig | None
     link: LinkConfig | None
@@ -199,6 +203,8 @@ class Env:
             wind=config.wind or None,
             downwash=config.downwash or None,
             cushion=config.cushion or None,
+            lost_rotor=config.lost_rotor or None,
+            lost_rotor_time=np.asarray(config.lost_rotor_time, dtype) if config.lost_rotor else None,
             disturbance=None if config.disturbance == DisturbanceConfig() else config.disturbance,
             estimate=None if config.estimate == EstimateConfig() else config.estimate,
             link=None if config.link == LinkConfig() else config.link,
@@ -228,8 +234,8 @@ class Env:
         spread = spread or any(camera != steady(camera) for camera in self.cameras)
         drawn = any(self.randomize.values()) or (self.posterior is not None and np.any(self.posterior.root))
         parts = (self.disturbance, DisturbanceConfig()), (self.estimate, EstimateConfig()), (self.link, LinkConfig())
-        air_moves = self.wind or self.downwash or self.cushion
-        return bool(spread or drawn or air_moves or any((part or none) != none for part, none in parts))
+        happens = self.wind or self.downwash or self.cushion or self.lost_rotor
+        return bool(spread or drawn or happens or any((part or none) != none for part, none in parts))
 
     @property
     def vehicles(self) -> str:
@@ -258,6 +264,7 @@ class Env:
             wind=self.wind and strength * self.wind,
             downwash=self.downwash and strength * self.downwash,
             cushion=self.cushion and strength * self.cushion,
+            lost_rotor=self.lost_rotor and strength * self.lost_rotor,
             disturbance=self.disturbance and _times(self.disturbance, strength),
             estimate=self.estimate and _times(self.estimate, strength),
             link=self.link and _times(self.link, strength),
@@ -271,7 +278,7 @@ class Env:
 
     @property
     def _own(self) -> tuple[Own, ...]:
-        rows = own_fields(imu=self.imu is not None, actions=self.seen_actions)
+        rows = own_fields(imu=self.imu is not None, actions=self.seen_actions, size=self.action_size)
         return tuple(row for row in rows if row.field.name not in self.unseen)
 
     def showing(self, names: Sequence[str]) -> "Env":
@@ -410,6 +417,8 @@ class Env:
             plant = disturbed.weaker(plant, physics.nominal, physics.mixer.thrust_max)
             physics = disturbed.mixed(physics)
             disturbed = disturbance.advance(disturbed, state.key_of(DISTURBED), period)
+        if state.lost_rotor is not None:
+            plant = state.lost_rotor.weaker(plant, state.time)
         if self.downwash is not None:
             blown = self.downwash * air.downwash(air.Jet.of(physics.nominal), before, self.agents)
             wind = blown if wind is None else wind + blown
@@ -484,6 +493,10 @@ class Env:
             if self.family is not None:  # in proportion to the size
                 offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
             plant["rotor_position"] = rotors - disturbance.level(offset, rotors)
+        lost = None
+        if self.lost_rotor is not None and self.lost_rotor_time is not None:
+            lost_key = jax.random.fold_in(plant_key, 4)
+            lost = lost_rotor.draw(self.lost_rotor, self.lost_rotor_time, lost_key, n, flown.rotor_count)
         dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)
         rotor_speed = jnp.broadcast_to(jnp.asarray(hover_rotor_speed(flown))[..., None], (n, flown.rotor_count))
@@ -504,6 +517,7 @@ class Env:
             wind=None if self.wind is None else self.wind * into_ball(uniform(wind_key, n, 3)),
             family=family,
             disturbance=disturbed,
+            lost_rotor=lost,
             estimate=None if self.estimate is None else pose_errors.draw(self.estimate, estimate_key, vehicle),
             link=None if self.link is None else lost_commands.draw(self.link, link_key, actions),
             past=past,

@@ -22,12 +22,12 @@ class Act:
     """A policy as a function, which JAX can compile or not (`run_stepwise`, `trace`)."""
 
     act: Callable[[Any, tuple[Any, ...], Any], tuple[Any, Any]]
-    """(observation (n, o), images, memory (n, k)) -> (action (n, 4), next memory)."""
+    """(observation (n, o), images, memory (n, k)) -> (action (n, c), next memory)."""
     begin: Callable[[int], Any] = lambda n: jnp.zeros((n, 0))
     """(number of vehicles) -> their memory at the start of an episode, (n, k)."""
 
     @staticmethod
-    def of(function: Callable[[Float[Array, "n o"]], Float[Array, "n 4"]]) -> "Act":
+    def of(function: Callable[[Float[Array, "n o"]], Float[Array, "n c"]]) -> "Act":
         """A policy that is a function of the observation only."""
         return Act(lambda observation, images, memory: (function(observation), memory))
 
@@ -80,7 +80,7 @@ class EpisodesUnderWay:
         none = Episodes(no, zero, zero, zero, zero, zero, zero, zero, zero, no)
         return EpisodesUnderWay(state, observation, no, none, zero)
 
-    def after(self, env: Env, action: Float[Array, "n 4"], settle: Any) -> "EpisodesUnderWay":
+    def after(self, env: Env, action: Float[Array, "n c"], settle: Any) -> "EpisodesUnderWay":
         """The episodes one control step later. The mean error counts from `settle` s on."""
         state, over, e = self.state, self.over, self.so_far
         reached, out = env.step(state, action, restart=False)
@@ -220,7 +220,7 @@ def part_of(state: EnvState, observation: Array, part: tuple[Array | int, int]) 
 
 def trace(
     env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int
-) -> tuple[State, Float[np.ndarray, "t n 4"], Float[np.ndarray, "t n 3"], Step]:
+) -> tuple[State, Float[np.ndarray, "t n c"], Float[np.ndarray, "t n 3"], Step]:
     """`n` episodes step by step, without restarts, for a policy that JAX need not compile.
 
     Returns:

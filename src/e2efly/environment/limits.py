@@ -28,6 +28,11 @@ def limits_of(config: EnvConfig, vehicle: Vehicle, family: Family | None) -> np.
     """
     if config.command_range is not None:
         given = np.asarray(config.command_range, np.float64)
+        if (size := len(COMMAND_MODES[config.command_mode].of(vehicle.rotor_count).fields)) != given.shape[1]:
+            raise ValueError(
+                f"env.command_range is {config.command_range} and a command of {vehicle.name} has {size} numbers, one "
+                "for each rotor; accepted: None, for the rotors' own limits"
+            )
         if not (np.all(np.isfinite(given)) and np.all(given[0] < given[1])):
             raise ValueError(
                 f"env.command_range is {config.command_range}; accepted: four finite numbers, and four that are larger"

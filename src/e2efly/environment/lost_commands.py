@@ -28,10 +28,10 @@ class LostCommands:
     """Length of a silence, s."""
     phase: Float[Array | np.ndarray, " n"]
     """Time since the start of the last silence at the start of the episode, s."""
-    arrived: Float[Array | np.ndarray, "n k 4"]
+    arrived: Float[Array | np.ndarray, "n k c"]
     """The actions that the flight controller has, newest first, in place of `EnvState.actions`."""
 
-    def after(self, key: PRNGKeyArray, action: Float[Array, "n 4"], time: Float[Array, " n"]) -> "LostCommands":
+    def after(self, key: PRNGKeyArray, action: Float[Array, "n c"], time: Float[Array, " n"]) -> "LostCommands":
         """The link when an action is sent, at a time since the start of the episode, s."""
         newest = jnp.where(self.loses(key, time)[:, None], self.arrived[:, 0], action)
         return dataclasses.replace(self, arrived=jnp.concatenate([newest[:, None], self.arrived[:, :-1]], axis=1))
@@ -42,7 +42,7 @@ class LostCommands:
         return dropped | (jnp.mod(time + self.phase, EVERY) < jnp.asarray(self.silence))
 
 
-def draw(config: LinkConfig, key: PRNGKeyArray, actions: Float[Array, "n k 4"]) -> LostCommands:
+def draw(config: LinkConfig, key: PRNGKeyArray, actions: Float[Array, "n k c"]) -> LostCommands:
     """The links of n episodes that start with these actions on their way."""
     n = actions.shape[0]
     strength = sometimes(key, n, [config.dropped, config.silence])

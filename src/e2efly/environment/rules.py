@@ -4,7 +4,6 @@ import dataclasses
 
 from e2efly.config import EnvConfig, check_fields
 from e2efly.config.numbers import LATEST
-from e2efly.control import COMMAND_MODES
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
 from e2efly.vehicles.family import Family
@@ -27,12 +26,6 @@ def check(
         posterior: the distribution from which an identified vehicle is drawn.
     """
     check_fields("env", config)
-    if body.rotor_count != 4 and COMMAND_MODES[config.command_mode].controller is None:
-        modes = ", ".join(repr(mode.name) for mode in COMMAND_MODES.values() if mode.controller is not None)
-        raise ValueError(
-            f"env.command_mode is {config.command_mode!r} and vehicle {body.name!r} has {body.rotor_count} rotors, "
-            f"where policies have four numbers; accepted: {modes}, or a vehicle with four rotors"
-        )
     check_widths(body, config.randomize, "env.randomize")
     latest = vehicle.latency if family is None else family.ranges.latency[1]
     if config.action_latency is None and latest + config.latency_spread[1] > LATEST:

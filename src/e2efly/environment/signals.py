@@ -15,7 +15,7 @@ from e2efly.tasks.task import Outcome, Task
 
 
 def happened(
-    task: Task, before: EnvState, after: EnvState, action: Float[Array, "n 4"], outcome: Outcome
+    task: Task, before: EnvState, after: EnvState, action: Float[Array, "n c"], outcome: Outcome
 ) -> dict[str, Array]:
     """The signals of every task, and those of this task, by name.
 

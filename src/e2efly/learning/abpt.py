@@ -44,7 +44,7 @@ class Stochastic:
     """A policy with noise."""
 
     mean: Weights
-    log_std: Float[Array | np.ndarray, "4"]
+    log_std: Float[Array | np.ndarray, " c"]
 
 
 @jax.tree_util.register_dataclass
@@ -53,7 +53,7 @@ class ABPTParameters:
     """What ABPT learns."""
 
     policy: Weights
-    log_std: Float[Array | np.ndarray, "4"]
+    log_std: Float[Array | np.ndarray, " c"]
     critics: tuple[Layers, Layers]
     targets: tuple[Layers, Layers]
     """The target critics: a slowly following average of the critics."""
@@ -76,7 +76,7 @@ class Transition:
     """The transitions from which the critics learn. Each leaf is (n, ...)."""
 
     here: Situation
-    action: Float[Array, "n 4"]
+    action: Float[Array, "n c"]
     reward: Float[Array, " n"]
     ended: Float[Array, " n"]
     """1: the episode has terminated and nothing follows."""
@@ -99,9 +99,11 @@ class ABPT(Algorithm):
             )
         rng = np.random.default_rng(seed)
         policy = self.actor.init(rng, np.asarray(env.hover))
-        sizes = (self.actor.features.state_size + env.privileged_size + 4, *self.actor.network.hidden, 1)
+        sizes = (self.actor.features.state_size + env.privileged_size + env.action_size, *self.actor.network.hidden, 1)
         critics = (init_mlp(rng, sizes, 1.0), init_mlp(rng, sizes, 1.0))
-        return ABPTParameters(policy, np.full(4, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics))
+        return ABPTParameters(
+            policy, np.full(env.action_size, config.log_std, np.float32), critics, jax.tree.map(np.copy, critics)
+        )
 
     def optimizer(self, config: ABPTConfig, parameters: ABPTParameters) -> dict[str, Any]:
         """The initial states of Adam for the policy and for the critics."""
@@ -112,7 +114,7 @@ class ABPT(Algorithm):
         """An empty buffer of transitions, and the first states as places where windows can begin."""
         n = observation.shape[0]
         here = self._here(env, RolloutState(state, observation, self.actor.memory(n)))
-        one = Transition(here, jnp.zeros((n, 4)), jnp.zeros(n), jnp.zeros(n), here)
+        one = Transition(here, jnp.zeros((n, env.action_size)), jnp.zeros(n), jnp.zeros(n), here)
         devices = config.envs // n
         places = Places.of((state, observation, self.actor.memory(n)), config.places // config.envs)
         return {"transitions": Ring.of(one, config.buffer // devices), "places": places}
@@ -155,7 +157,7 @@ class ABPT(Algorithm):
     def _here(self, env: Env, at: RolloutState) -> Situation:
         return self._situation(at.env.images, at.observation, env.privileged(at.env), at.memory)
 
-    def _act(self, policy: Stochastic, here: Situation, z: Float[Array, "n 4"]) -> tuple[Array, Array]:
+    def _act(self, policy: Stochastic, here: Situation, z: Float[Array, "n c"]) -> tuple[Array, Array]:
         """An action with noise, and the next recurrent state."""
         mean, memory = self.actor(policy.mean, here.features, here.memory)
         return mean + jnp.exp(policy.log_std) * z, memory
@@ -188,7 +190,7 @@ class ABPT(Algorithm):
             ended = out.terminated.astype(jnp.float32)
             return after, (Transition(here, action, out.reward, ended, there), out.done, out.success)
 
-        noise = jax.random.normal(key, (config.collect, *state.observation.shape[:1], 4))
+        noise = jax.random.normal(key, (config.collect, *state.observation.shape[:1], env.action_size))
         last, (transitions, done, success) = jax.lax.scan(step, RolloutState.of(state), noise)
         flat = jax.tree.map(lambda x: x.reshape(x.shape[0] * x.shape[1], *x.shape[2:]), transitions)
         return last, flat, {"reward": jnp.mean(transitions.reward), **episode_metrics(done, success)}
@@ -212,7 +214,7 @@ class ABPT(Algorithm):
             critics, targets, optimizer = carry
             rows_key, noise_key = jax.random.split(key)
             batch = ring.drawn(rows_key, size)
-            follows = self._value(policy, targets, batch.there, jax.random.normal(noise_key, (size, 4)))
+            follows = self._value(policy, targets, batch.there, jax.random.normal(noise_key, batch.action.shape))
             target = batch.reward + config.gamma * (1.0 - batch.ended) * follows
             loss, grads = jax.value_and_grad(error)(critics, batch, target)
             critics, optimizer, _ = descend(config, rate, critics, optimizer, grads)
@@ -253,7 +255,7 @@ class ABPT(Algorithm):
         key: PRNGKeyArray,
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], dict[str, Array]]:
-        noise = jax.random.normal(key, (config.horizon + 2, start.observation.shape[0], 4))
+        noise = jax.random.normal(key, (config.horizon + 2, start.observation.shape[0], env.action_size))
 
         def follows(images: Any, observation: Array, privileged: Array, memory: Array, z: Array) -> Array:
             return self._value(policy, targets, self._situation(images, observation, privileged, memory), z)

@@ -60,7 +60,7 @@ class FOPPO(PPO):
         gradient.
         """
         n = state.observation.shape[0]
-        noise, cuts = jax.random.normal(key, (config.horizon, n, 4)), gradient_cuts(config, progress)
+        noise, cuts = jax.random.normal(key, (config.horizon, n, env.action_size)), gradient_cuts(config, progress)
 
         def follows(images: Any, observation: Array, privileged: Array, memory: Array, noise: Any) -> Array:
             del images, memory, noise

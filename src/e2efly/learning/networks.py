@@ -290,7 +290,7 @@ class Actor:
             (recurrent, _), zero = init_mlp(rng, (units, 3 * units), 1.0)[0], np.zeros(3 * units, np.float32)
             cell = Gru(init_mlp(rng, (size, 3 * units), 1.0)[0][0], recurrent, zero, zero)
             size += units
-        head = init_mlp(rng, (size, *self.network.hidden, 4), 0.01)
+        head = init_mlp(rng, (size, *self.network.hidden, len(hover)), 0.01)
         head[-1] = (head[-1][0], np.arctanh(np.clip(hover, -0.9, 0.9)).astype(np.float32))
         return Weights(encoders, cell, head)
 
@@ -300,7 +300,7 @@ class Actor:
 
     def __call__(
         self, weights: Weights, features: Float[Array, "*n f"], memory: Float[Array, "*n k"]
-    ) -> tuple[Float[Array, "*n 4"], Float[Array, "*n k"]]:
+    ) -> tuple[Float[Array, "*n c"], Float[Array, "*n k"]]:
         """The action (tanh of the network, in (-1, 1)) and the GRU's next memory."""
         activation = self.network.activation
         state, *images = self.features.apart(features)

@@ -37,11 +37,8 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         ValueError: when `env` was not built from `config.env` and the current vehicle file, naming the field.
     """
     about, physics = config.env, env.physics
-    vehicle, mode, family = (
-        nominal_vehicle(about.vehicle),
-        COMMAND_MODES[about.command_mode],
-        load_family(about.vehicle),
-    )
+    vehicle, family = nominal_vehicle(about.vehicle), load_family(about.vehicle)
+    mode = COMMAND_MODES[about.command_mode].of(vehicle.rotor_count)
     rate = vehicle.control_rate if about.control_rate is None else about.control_rate
     low, high = limits_of(about, vehicle, family)
     _same("command_mode", physics.command_mode, mode.name)
@@ -130,7 +127,7 @@ def _image(name: str, view: View, control_rate: float) -> Image:
 
 
 def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract) -> None:
-    """Write a policy as ONNX with its digest, atomically: float32 `observation` (n, o) -> `action` (n, 4) in [-1, 1].
+    """Write a policy as ONNX with its digest, atomically: float32 `observation` (n, o) -> `action` (n, c) in [-1, 1].
 
     A policy with cameras has one input `image_0`, ... for each camera: its image, (n, h, w) or (n, h, w, 3). A policy
     with a GRU also has `memory` (n, k) -> `next_memory` (n, k).
@@ -153,7 +150,7 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
     ):
         if has != wanted:
             raise ValueError(f"contract.{name} is {has}; accepted: that of the policy, {wanted}")
-    _check(weights, actor)
+    _check(weights, actor, contract)
     graph = policy_graph(jax.tree.map(lambda x: np.asarray(x, np.float32), weights), actor, [i.name for i in images])
     write_policy(path, graph, contract)
 
@@ -179,9 +176,9 @@ def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None
     write_atomically(Path(path), content)
 
 
-def _check(weights: Weights, actor: Actor) -> None:
+def _check(weights: Weights, actor: Actor, contract: Contract) -> None:
     """Check that every array has the shape that the policy needs and is finite."""
-    wanted = _arrays(actor.init(np.random.default_rng(0), np.zeros(4)))
+    wanted = _arrays(actor.init(np.random.default_rng(0), np.array(contract.hover_action)))
     has = _arrays(weights)
     if list(has) != list(wanted):
         raise ValueError(f"weights has the arrays {', '.join(has)}; accepted: {', '.join(wanted)}")

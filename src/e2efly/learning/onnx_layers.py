@@ -77,7 +77,8 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     inputs: dict[str, tuple[int, ...]] = {INPUT: (sum(field.size for field in features.fields),)}
     inputs |= {name: image_shape(view.camera) for name, view in zip(images, features.views, strict=True)}
     memory = {MEMORY: (units,)} if units else {}
-    return graph.whole(inputs | memory, {OUTPUT: (4,)} | ({NEXT_MEMORY: (units,)} if units else {}))
+    action = {OUTPUT: (len(weights.head[-1][1]),)}
+    return graph.whole(inputs | memory, action | ({NEXT_MEMORY: (units,)} if units else {}))
 
 
 def perceptron_graph(
@@ -109,7 +110,7 @@ def perceptron_graph(
         scaled = graph.node("Div", [centred, graph.constant("deviation", deviation.astype(np.float32))], "scaled")
         source = graph.clip(scaled, most, "normalised")
     graph.clip(graph.layers(layers, source, operators, "unclipped"), min(most, 1.0), OUTPUT)
-    return graph.whole({INPUT: (sum(field.size for field in features.fields),)}, {OUTPUT: (4,)})
+    return graph.whole({INPUT: (sum(field.size for field in features.fields),)}, {OUTPUT: (len(layers[-1][1]),)})
 
 
 def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str) -> str:

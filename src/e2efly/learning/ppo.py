@@ -28,7 +28,7 @@ class PPOParameters:
     """What PPO learns."""
 
     policy: Weights
-    log_std: Float[Array | np.ndarray, "4"]
+    log_std: Float[Array | np.ndarray, " c"]
     critic: Layers
 
 
@@ -40,7 +40,7 @@ class Acted:
     features: Float[Array, "*t f"]
     memory: Float[Array, "*t k"]
     critic_input: Float[Array, "*t c"]
-    action: Float[Array, "*t 4"]
+    action: Float[Array, "*t c"]
 
 
 @jax.tree_util.register_dataclass
@@ -56,7 +56,7 @@ class PPOSamples:
     """Whether the episode ended with this step. The next step then begins without memory."""
 
 
-def log_prob(z: Float[Array, "*t 4"], log_std: Float[Array | np.ndarray, "4"]) -> Float[Array, "*t"]:
+def log_prob(z: Float[Array, "*t c"], log_std: Float[Array | np.ndarray, " c"]) -> Float[Array, "*t"]:
     """Log density of a diagonal Gaussian at a point that is `z` standard deviations from the mean."""
     return -jnp.sum(0.5 * z**2 + log_std + 0.5 * jnp.log(2 * jnp.pi), axis=-1)
 
@@ -78,7 +78,7 @@ class PPO(Algorithm):
         rng = np.random.default_rng(seed)
         return PPOParameters(
             self.actor.init(rng, np.asarray(env.hover)),
-            np.full(4, config.log_std, np.float32),
+            np.full(env.action_size, config.log_std, np.float32),
             init_critic(rng, self.actor, env),
         )
 
@@ -95,7 +95,7 @@ class PPO(Algorithm):
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
 
     def act(
-        self, env: Env, parameters: PPOParameters, at: RolloutState, z: Float[Array, "n 4"]
+        self, env: Env, parameters: PPOParameters, at: RolloutState, z: Float[Array, "n c"]
     ) -> tuple[Array, Array, Acted]:
         """The action with noise, the next recurrent state, and the data that a sample stores."""
         features = self.actor.features(at.observation, at.env.images)
@@ -139,7 +139,7 @@ class PPO(Algorithm):
         self, env: Env, config: Any, state: TrainState, key: PRNGKeyArray
     ) -> tuple[PPOSamples, RolloutState, dict[str, Array]]:
         parameters = state.parameters
-        noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], 4))
+        noise = jax.random.normal(key, (config.horizon, *state.observation.shape[:1], env.action_size))
 
         def step(at: RolloutState, z: Array) -> tuple[RolloutState, Any]:
             action, memory, acted = self.act(env, parameters, at, z)
@@ -162,7 +162,7 @@ def in_pieces(samples: PPOSamples, length: int) -> PPOSamples:
     return jax.tree.map(cut, samples)
 
 
-def means(actor: Actor, policy: Weights, batch: PPOSamples) -> Float[Array, "*t 4"]:
+def means(actor: Actor, policy: Weights, batch: PPOSamples) -> Float[Array, "*t c"]:
     """The action of the policy without noise for each sample. With a GRU, the samples are pieces (m, length, ...)."""
     acted = batch.acted
     if not actor.network.recurrent:

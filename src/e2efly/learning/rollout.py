@@ -86,7 +86,7 @@ def damped(tree: Any, keep: Array) -> Any:
 
 
 def advance(
-    env: Env, config: Any, at: RolloutState, action: Float[Array, "n 4"], memory: Float[Array, "n k"], critic: bool
+    env: Env, config: Any, at: RolloutState, action: Float[Array, "n c"], memory: Float[Array, "n k"], critic: bool
 ) -> tuple[RolloutState, Step]:
     """One control step, with new starts where episodes ended.
 
@@ -115,9 +115,9 @@ def window(
     start: RolloutState,
     act: Callable[[RolloutState, Array], tuple[Array, Array, Any]],
     value: Value,
-    noise: Float[Array, "t n 4"],
+    noise: Float[Array, "t n c"],
     cuts: Bool[Array, " t"],
-    last_noise: Float[Array, "n 4"] | None = None,
+    last_noise: Float[Array, "n c"] | None = None,
 ) -> tuple[dict[str, Array], RolloutState, tuple[Any, Array, StepRecord]]:
     """A differentiable rollout. A critic's value is added where the window ends, where the gradient is cut, and where
     an episode times out.

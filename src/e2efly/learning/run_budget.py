@@ -59,7 +59,10 @@ def run_memory(config: TrainConfig, env: Env, actor: Actor, members: int = 1) ->
     observed = ", ".join((f"with {env.observation_size} observed numbers", *past, *rooms, *images, *together))
     parts = {
         f"network.hidden is {network.hidden}, recurrent {network.recurrent}, encoder {network.encoder}, "
-        f"convolution {network.convolution}, {observed}": 40 * _weights(actor) * (config.devices or 1) * members,
+        f"convolution {network.convolution}, {observed}": 40
+        * _weights(actor, env.action_size)
+        * (config.devices or 1)
+        * members,
         f"algo.envs is {algo.envs}, algo.horizon {algo.horizon}, {observed}": (
             algo.envs * (algo.horizon * step + vehicle * members)
         ),
@@ -85,7 +88,7 @@ def run_steps(config: TrainConfig, updates: int, judged: int) -> dict[str, float
     }
 
 
-def _weights(actor: Actor) -> float:
+def _weights(actor: Actor, action_size: int) -> float:
     """Number of weights of a policy. A critic has about as many."""
     network, count = actor.network, 0.0
     size = actor.features.state_size + len(actor.features.views) * (network.encoder or (0,))[-1]
@@ -96,7 +99,7 @@ def _weights(actor: Actor) -> float:
             cells, channels = cells // side**2, wider
         count += _layers((cells * channels, *network.encoder))
     count += 3.0 * network.recurrent * (size + network.recurrent)
-    return count + _layers((size + network.recurrent, *network.hidden, 4))
+    return count + _layers((size + network.recurrent, *network.hidden, action_size))
 
 
 def _layers(sizes: tuple[int, ...]) -> float:

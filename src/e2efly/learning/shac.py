@@ -100,7 +100,7 @@ class SHAC(Algorithm):
         progress: Float[Array, ""],
     ) -> tuple[dict[str, Array], Any]:
         n = state.observation.shape[0]
-        noise = config.noise * jax.random.normal(key, (config.horizon, n, 4))
+        noise = config.noise * jax.random.normal(key, (config.horizon, n, env.action_size))
 
         def follows(images: Any, observation: Array, privileged: Array, memory: Array, noise: Any) -> Array:
             del images, memory, noise

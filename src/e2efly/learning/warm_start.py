@@ -127,7 +127,7 @@ def _shape(contract: Contract) -> dict[str, Any]:
     """
     found: dict[str, Any] = {"observation": [field.name for field in contract.observation]}
     found |= {"number of images": len(contract.images), "memory_size": contract.memory_size}
-    found["command mode"] = contract.action.mode
+    found |= {"command mode": contract.action.mode, "number of commands": contract.action.size}
     for parts, names in (
         (contract.observation, ("size", "frame", "scale")),
         (contract.images, ("sees", "of", "width", "height", "encoding", "pool", "preprocessing")),

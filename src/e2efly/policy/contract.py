@@ -23,7 +23,7 @@ from e2efly.policy.others import OTHERS
 from e2efly.policy.zoo import contents
 from e2efly.vehicles.family import Ranges
 from e2efly.vehicles.gravity import GRAVITY
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import ROTOR_COUNTS, Vehicle
 from e2efly.vehicles.vehicle_domain import differences, misfits, vehicle_domain
 
 CONTRACT_VERSION = 2
@@ -32,8 +32,6 @@ LARGEST = 1 << 20
 """Largest length of the JSON. The longest of the zoo has 3050 characters."""
 METADATA_KEY = "contract"
 """Key of the contract in the metadata of the ONNX file."""
-ACTION_SIZE = 4
-"""Number of entries of an action."""
 ACTION_LIMITS = (-1.0, 1.0)
 """Smallest and largest entry of an action. Values outside are clipped before the mapping to a command."""
 ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
@@ -60,7 +58,7 @@ class Action:
     mode: str
     """A command mode: a name of `COMMAND_MODES`."""
     fields: tuple[str, ...]
-    """Names of the four commands."""
+    """Names of the commands: four, or one for each rotor in the modes of rotor thrusts."""
     units: tuple[str, ...]
     """Their units."""
     low: tuple[float, ...]
@@ -73,18 +71,27 @@ class Action:
     """How an action becomes a command."""
 
     @property
-    def command_range(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
-        """Smallest and largest command, in `units`."""
+    def command_range(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]] | None:
+        """Smallest and largest command, in `units`, as `EnvConfig.command_range`. None: a command has not four numbers,
+        and its limits are those of the vehicle's rotors.
+        """
+        if self.size != 4:
+            return None
         (a, b, c, d), (e, f, g, h) = self.low, self.high
         return (a, b, c, d), (e, f, g, h)
 
+    @property
+    def size(self) -> int:
+        """Number of entries of an action."""
+        return len(self.fields)
+
     def command(self, action: np.ndarray) -> np.ndarray:
-        """The commands for actions, (..., 4) float64, by `mapping`. Actions are clipped to `limits`."""
+        """The commands for actions, (..., c) float64, by `mapping`. Actions are clipped to `limits`."""
         low, high = np.array(self.low), np.array(self.high)
         return low + (np.clip(np.asarray(action, np.float64), *ACTION_LIMITS) + 1) / 2 * (high - low)
 
     def asking(self, command: np.ndarray) -> np.ndarray:
-        """The action that gives a command, (..., 4), float32: the inverse of `mapping`, clipped to `limits`."""
+        """The action that gives a command, (..., c), float32: the inverse of `mapping`, clipped to `limits`."""
         low, high = np.array(self.low), np.array(self.high)
         return np.clip(2 * (command - low) / (high - low) - 1, *ACTION_LIMITS).astype(np.float32)
 
@@ -220,12 +227,12 @@ class Contract:
     @cached_property
     def past_actions(self) -> int:
         """Number of its own last actions that it sees."""
-        return sum(field.size for field in self.observation if field.name == PAST_ACTIONS) // ACTION_SIZE
+        return sum(field.size for field in self.observation if field.name == PAST_ACTIONS) // self.action.size
 
     @cached_property
     def own(self) -> tuple[Own, ...]:
         """The vehicle's own fields that it sees, in the order of the table."""
-        rows = own_fields(imu=True, actions=self.past_actions)
+        rows = own_fields(imu=True, actions=self.past_actions, size=self.action.size)
         return tuple(row for row in rows if row.field.name in self.slices)
 
     @property
@@ -289,9 +296,10 @@ def _contract(x: dict[str, Any]) -> Contract:
     vehicle_hash = None if x["vehicle_ranges"] is not None else read.text(x["vehicle_hash"], "vehicle_hash")
     if vehicle_hash is not None and (len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef")):
         raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
-    hover = read.numbers(x["hover_action"], "hover_action", ACTION_SIZE)
+    action = _action(x["action"])
+    hover = read.numbers(x["hover_action"], "hover_action", action.size)
     if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
-        raise read.refusal("hover_action", list(hover), "four numbers in [-1, 1]")
+        raise read.refusal("hover_action", list(hover), f"{action.size} numbers in [-1, 1]")
     return Contract(
         contract_version=x["contract_version"],
         e2efly_version=read.text(x["e2efly_version"], "e2efly_version"),
@@ -302,10 +310,10 @@ def _contract(x: dict[str, Any]) -> Contract:
         latency_s=latency_s,
         latency_range_s=latency,
         observation_latency_range_s=read.seconds_range(x["observation_latency_range_s"], "observation_latency_range_s"),
-        observation=_observation(x["observation"]),
+        observation=_observation(x["observation"], action.size),
         images=_images(x["images"], rate),
         memory_size=read.whole(x["memory_size"], "memory_size", 0),
-        action=_action(x["action"]),
+        action=action,
         hover_action=hover,
         vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
         **{name: None if x[name] is None else _domain(x[name], name) for name in OPTIONAL if name != "sensing"},
@@ -349,9 +357,9 @@ def _ranges(value: Any) -> Ranges:
     return ranges
 
 
-def _observation(value: Any) -> tuple[Field, ...]:
+def _observation(value: Any, action_size: int) -> tuple[Field, ...]:
     entries = read.entries(value, "observation", None)
-    fields = tuple(_field(entry, f"observation[{i}]") for i, entry in enumerate(entries))
+    fields = tuple(_field(entry, f"observation[{i}]", action_size) for i, entry in enumerate(entries))
     names = [field.name for field in fields]
     if len(set(names)) != len(names):
         raise read.refusal("observation", names, "fields of different names")
@@ -360,15 +368,15 @@ def _observation(value: Any) -> tuple[Field, ...]:
     return fields
 
 
-def _field(value: Any, where: str) -> Field:
+def _field(value: Any, where: str, action_size: int) -> Field:
     x = read.table(value, where, Field)
     size, frame = read.whole(x["size"], f"{where}.size", 1), read.one_of(x["frame"], f"{where}.frame", FRAMES)
     if (frame == "world" and size % 3) or (frame == "world_body" and size != 4):
         needed = "a multiple of 3, as its frame is 'world'" if frame == "world" else "4, as its frame is 'world_body'"
         raise read.refusal(f"{where}.size", size, needed)
     name, unit, text = (read.text(x[key], f"{where}.{key}") for key in ("name", "unit", "description"))
-    if name == PAST_ACTIONS and size % ACTION_SIZE:
-        raise read.refusal(f"{where}.size", size, f"a multiple of {ACTION_SIZE}, as its name is {name!r}")
+    if name == PAST_ACTIONS and size % action_size:
+        raise read.refusal(f"{where}.size", size, f"a multiple of {action_size}, as its name is {name!r}")
     scale = read.number(x["scale"], f"{where}.scale")
     if scale <= 0:
         raise read.refusal(f"{where}.scale", scale, "a positive number")
@@ -391,7 +399,9 @@ def _images(value: Any, rate: float) -> tuple[Image, ...]:
 def _action(value: Any) -> Action:
     x = read.table(value, "action", Action)
     mode = read.one_of(x["mode"], "action.mode", COMMAND_MODES)
-    fields, units = COMMAND_MODES[mode].fields, COMMAND_MODES[mode].units
+    count = len(x["fields"]) if isinstance(x["fields"], list) else 0
+    known = COMMAND_MODES[mode].of(count if count in ROTOR_COUNTS else 4)
+    fields, units = known.fields, known.units
     for key, accepted in (("fields", fields), ("units", units)):
         if x[key] != list(accepted):
             raise read.refusal(f"action.{key}", x[key], f"{list(accepted)}, as action.mode is {mode!r}")
@@ -399,9 +409,9 @@ def _action(value: Any) -> Action:
         raise read.refusal("action.limits", x["limits"], f"{list(ACTION_LIMITS)}")
     if x["mapping"] != ACTION_MAPPING:
         raise read.refusal("action.mapping", x["mapping"], repr(ACTION_MAPPING))
-    low, high = (read.numbers(x[key], f"action.{key}", ACTION_SIZE) for key in ("low", "high"))
+    low, high = (read.numbers(x[key], f"action.{key}", len(fields)) for key in ("low", "high"))
     if not all(a < b for a, b in zip(low, high, strict=True)):
-        raise read.refusal("action.low", list(low), f"four numbers below action.high, {list(high)}")
+        raise read.refusal("action.low", list(low), f"{len(fields)} numbers below action.high, {list(high)}")
     if fields[0] == THRUST and not 0 <= low[0] < GRAVITY < high[0]:
         accepted = f"from 0 or more, below {GRAVITY} m/s^2, to more than it, which hovers"
         raise read.refusal("action.low[0] to action.high[0], the collective thrust,", [low[0], high[0]], accepted)

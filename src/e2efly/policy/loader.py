@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime as ort
 
-from e2efly.policy.contract import ACTION_SIZE, METADATA_KEY, Contract
+from e2efly.policy.contract import METADATA_KEY, Contract
 from e2efly.policy.onnx_file import METADATA, Message, check_seal, file_content, is_sealed, read, sealed, write
 from e2efly.policy.onnx_graph import FLOAT, IR_VERSION, OPSET, TYPES, check
 from e2efly.policy.onnx_session import open_session
@@ -53,7 +53,7 @@ class Policy:
             memory: what the last call returned, (k,) or (n, k); None at the start of a flight.
 
         Returns:
-            The action, float32 in [-1, 1], shape (4,) or (n, 4); and the memory for the next call, (k,) or (n, k), with
+            The action, float32 in [-1, 1], shape (c,) or (n, c); and the memory for the next call, (k,) or (n, k), with
             k = 0 if `contract.memory_size` is 0.
 
         Raises:
@@ -84,14 +84,14 @@ class Policy:
         return action if lead else action[0], known
 
     def command(self, action: np.ndarray) -> np.ndarray:
-        """The commands for actions, shape (4,) or (n, 4), in `contract.action.units`. Actions are clipped to [-1, 1].
+        """The commands for actions, shape (c,) or (n, c), in `contract.action.units`. Actions are clipped to [-1, 1].
 
         Raises:
             ValueError: for a wrong shape or a non-finite number.
         """
-        a = np.asarray(action, np.float64)
-        if a.ndim not in (1, 2) or a.shape[-1] != ACTION_SIZE:
-            raise ValueError(f"action has shape {a.shape}; accepted: ({ACTION_SIZE},) or (n, {ACTION_SIZE})")
+        a, size = np.asarray(action, np.float64), self.contract.action.size
+        if a.ndim not in (1, 2) or a.shape[-1] != size:
+            raise ValueError(f"action has shape {a.shape}; accepted: ({size},) or (n, {size})")
         if not np.isfinite(a).all():
             raise ValueError(f"action is {a.tolist()}; accepted: finite numbers")
         return self.contract.action.command(a)
@@ -255,7 +255,7 @@ def _check_interface(
         )
     inputs: dict[str, tuple[int, ...]] = {INPUT: (contract.observation_size,)}
     inputs |= {image.name: image.shape for image in contract.images}
-    outputs: dict[str, tuple[int, ...]] = {OUTPUT: (ACTION_SIZE,)}
+    outputs: dict[str, tuple[int, ...]] = {OUTPUT: (contract.action.size,)}
     if contract.memory_size:
         inputs[MEMORY] = outputs[NEXT_MEMORY] = (contract.memory_size,)
     for side, wanted in (("input", inputs), ("output", outputs)):

@@ -42,9 +42,9 @@ PAST_ACTIONS = "past_actions"
 """Name of the field with the policy's own last outputs."""
 
 
-def past_actions(count: int) -> Field:
-    """The field with the policy's last outputs."""
-    return Field(PAST_ACTIONS, 4 * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")
+def past_actions(count: int, size: int = 4) -> Field:
+    """The field with the policy's last outputs, of `size` numbers each."""
+    return Field(PAST_ACTIONS, size * count, "none", "1", 1.0, "the policy's last outputs in [-1, 1], newest first")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Known:
     imu: Any
     """`gyroscope` (*n, 3) body, rad/s; `accelerometer` (*n, 3) body, m/s^2. None: there is no IMU."""
     past_actions: Array
-    """(*n, k, 4) the last actions, newest first."""
+    """(*n, k, c) the last actions, newest first."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,13 @@ OWN = (
 needs. A policy that was exported before an entry was added goes on without it, in the simulator and in flight."""
 
 
-def own_fields(*, imu: bool, actions: int) -> tuple[Own, ...]:
-    """The rows of the table that there are with or without an IMU, and with a number of past actions."""
+def own_fields(*, imu: bool, actions: int, size: int = 4) -> tuple[Own, ...]:
+    """The rows of the table that there are with or without an IMU, and with a number of past actions of `size` numbers
+    each.
+    """
     there = {"motion": True, "imu": imu, PAST_ACTIONS: actions > 0}
     rows = (row for row in OWN if there[row.source])
     return tuple(
-        dataclasses.replace(row, field=past_actions(actions)) if row.source == PAST_ACTIONS else row for row in rows
+        dataclasses.replace(row, field=past_actions(actions, size)) if row.source == PAST_ACTIONS else row
+        for row in rows
     )

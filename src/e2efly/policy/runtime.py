@@ -196,7 +196,7 @@ def check(
         )
     for image in contract.images if not images else ():
         reasons.append(f"{image.lacking}; accepted: a policy without images (from Python, `Policy.act` takes them)")
-    own = own_fields(imu=True, actions=max(contract.past_actions, 1))
+    own = own_fields(imu=True, actions=max(contract.past_actions, 1), size=contract.action.size)
     known = {field.name: field for field in (*shown, *(row.field for row in own))}
     sensed = {row.field.name for row in own if row.source == "imu"}
     for field in contract.observation:

@@ -67,19 +67,19 @@ def progway(way: Scalar, previous_way: Scalar) -> Scalar:
     return previous_way - way
 
 
-def act1(action: Float[Array, "*n 4"]) -> Scalar:
+def act1(action: Float[Array, "*n c"]) -> Scalar:
     """Minus the length of the action (Eq. act1, with the sign of act3)."""
     return -norm(action)
 
 
-def act2(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
+def act2(action: Float[Array, "*n c"], previous_action: Float[Array, "*n c"]) -> Scalar:
     """Minus the length of the change of the action (Eq. act2, with the sign of act3)."""
     return -norm(action - previous_action)
 
 
 def act3(
-    action: Float[Array, "*n 4"],
-    previous_action: Float[Array, "*n 4"],
+    action: Float[Array, "*n c"],
+    previous_action: Float[Array, "*n c"],
     act3_size: float | Array = 0.025,
     act3_change: float | Array = 0.002,
 ) -> Scalar:
@@ -234,7 +234,12 @@ def anglev_sq(body_rate: Vector) -> Scalar:
     return -jnp.sum(body_rate**2, axis=-1)
 
 
-def act2_sq(action: Float[Array, "*n 4"], previous_action: Float[Array, "*n 4"]) -> Scalar:
+def anglevxy_sq(body_rate: Vector) -> Scalar:
+    """Minus the squared body rate about body x and y, (rad/s)^2: the vehicle may spin about its own axis. Ours."""
+    return -jnp.sum(body_rate[..., :2] ** 2, axis=-1)
+
+
+def act2_sq(action: Float[Array, "*n c"], previous_action: Float[Array, "*n c"]) -> Scalar:
     """Minus the squared change of the action: smooth at zero. Ours."""
     return -jnp.sum((action - previous_action) ** 2, axis=-1)
 
@@ -254,7 +259,7 @@ def descent(
 
 
 def imitate(
-    action: Float[Array, "*n 4"], expert_action: Float[Array, "*n 4"], imitate_rounding: float | Array = 0.05
+    action: Float[Array, "*n c"], expert_action: Float[Array, "*n c"], imitate_rounding: float | Array = 0.05
 ) -> Scalar:
     """Minus the distance to an expert's action, summed over its entries: sqrt(e^2 + r^2) - r. Ours.
 
@@ -316,7 +321,7 @@ class Term:
 _KINDS: dict[Kind, tuple[Callable[..., Array], ...]] = {
     "differentiable": (
         prog1, prog2, progxy, progx, progy, progz, act1, act2, act3, ori1, ori3, v1, v2, v3, anglev, near,
-        anglev_sq, act2_sq, upright, imitate, vel, overspeed, progway, alive,
+        anglev_sq, anglevxy_sq, act2_sq, upright, imitate, vel, overspeed, progway, alive,
     ),
     "partly": (ori2, ori4, vz, avoid1, avoid2, avoid, apart, descent, fit, fitlog),
     "sparse": (goal, crash),

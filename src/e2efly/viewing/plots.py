@@ -204,7 +204,7 @@ def _bound(ax: Axes, top: float, both: bool = False) -> None:
 
 def _command(ax: Axes, time: Float[np.ndarray, " t"], command: Float[np.ndarray, "t c"], name: str) -> None:
     """Draw the collective thrust relative to gravity, if the mode has one. Otherwise all numbers of the command."""
-    mode = COMMAND_MODES[name]
+    mode = COMMAND_MODES[name].of(command.shape[-1])
     if mode.fields[0] == "collective_thrust":
         ax.axhline(1.0, color=GREY, label="hover: 1 g", **_DASHED)
         ax.plot(time, command[:, 0] / GRAVITY, color=BLUE, drawstyle="steps-post", label="commanded")

@@ -55,12 +55,12 @@ class Compiled:
         self.library.policy_begin(pointer(self.state))
 
     def command(self, action: np.ndarray) -> np.ndarray:
-        out = np.empty(4, np.float32)
+        out = np.empty(self.contract.action.size, np.float32)
         self.library.policy_command(pointer(np.ascontiguousarray(action, np.float32)), pointer(out))
         return out
 
     def _call(self, function: Any, seen: np.ndarray, images: Sequence[np.ndarray]) -> tuple[int, np.ndarray]:
-        action = np.full(4, 9.0, np.float32)
+        action = np.full(self.contract.action.size, 9.0, np.float32)
         given = [np.ascontiguousarray(x, np.float32) for x in (seen, *images)]
         status = function(pointer(self.state), *map(pointer, given), pointer(action))
         return status, action

@@ -43,7 +43,7 @@ def both(
     made: Compiled, observation: np.ndarray, images: list[np.ndarray], memory: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Actions and next memories of the C, row by row."""
-    actions, after = np.empty((len(observation), 4)), np.empty(memory.shape)
+    actions, after = np.empty((len(observation), made.contract.action.size)), np.empty(memory.shape)
     for k, row in enumerate(observation):
         made.memory[:] = memory[k]
         status, actions[k] = made.network(row, [x[k] for x in images])

@@ -22,7 +22,7 @@ from e2efly.policy.c_export.header import (
 )
 from e2efly.policy.c_export.program import CProgram, Operand, layout
 from e2efly.policy.c_export.text import array, comment, number
-from e2efly.policy.contract import ACTION_SIZE, Contract
+from e2efly.policy.contract import Contract
 from e2efly.policy.images import ROUNDING as IMAGE_ROUNDING
 from e2efly.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT, ROUNDING, UNIT_TOLERANCE
 from e2efly.policy.observation import PAST_ACTIONS
@@ -74,7 +74,7 @@ def _network(c: Contract, name: str, program: CProgram, places: list[int], outpu
     big = name.upper()
     lines = [
         f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
-        f"{image_parameters(c)} float action[4])",
+        f"{image_parameters(c)} float action[{c.action.size}])",
         "{",
         "    real *const s = state->scratch;",
         *(f"    real *const b{i} = s + {place};" for i, place in enumerate(places) if _is_used(program, i)),
@@ -89,9 +89,9 @@ def _network(c: Contract, name: str, program: CProgram, places: list[int], outpu
     action, most = outputs[OUTPUT], number(1 + ROUNDING)
     lines += [
         "",
-        f"    for (int i = 0; i < {ACTION_SIZE}; i++)",
+        f"    for (int i = 0; i < {c.action.size}; i++)",
         f"        if (!(REAL(fabs)({action.text}[i]) <= {most})) return {big}_BAD_ACTION;",
-        f"    for (int i = 0; i < {ACTION_SIZE}; i++) {{",
+        f"    for (int i = 0; i < {c.action.size}; i++) {{",
         f"        const float a = (float){action.text}[i];",
         "        action[i] = a < -1.0f ? -1.0f : a > 1.0f ? 1.0f : a;",
         "    }",
@@ -130,18 +130,21 @@ def _in_range(c: Contract, big: str) -> list[str]:
 
 
 def _around(c: Contract, name: str) -> str:
-    big, past = name.upper(), ACTION_SIZE * c.past_actions
+    big, size = name.upper(), c.action.size
+    past = size * c.past_actions
     begin = [f"    for (int i = 0; i < {c.memory_size}; i++) state->memory[i] = 0.0f;"] if c.memory_size else []
     begin += [f"    for (int i = 0; i < {c.observation_size}; i++) state->observation[i] = 0.0f;"]
-    begin += [f"    for (int i = 0; i < {past}; i++) state->past_actions[i] = hover_action[i % 4];"] if past else []
+    begin += (
+        [f"    for (int i = 0; i < {past}; i++) state->past_actions[i] = hover_action[i % {size}];"] if past else []
+    )
     copies = [
         f"    for (int i = 0; i < {field.size}; i++) state->observation[{c.slices[field.name].start} + i] = "
         + (f"state->{PAST_ACTIONS}[i];" if field.name == PAST_ACTIONS else f"seen->{field_name(field.name)}[i];")
         for field in c.observation
     ]
     shift = [
-        f"    for (int i = {past - 1}; i >= 4; i--) state->past_actions[i] = state->past_actions[i - 4];",
-        "    for (int i = 0; i < 4; i++) state->past_actions[i] = action[i];",
+        f"    for (int i = {past - 1}; i >= {size}; i--) state->past_actions[i] = state->past_actions[i - {size}];",
+        f"    for (int i = 0; i < {size}; i++) state->past_actions[i] = action[i];",
     ]
     given, images = "".join(f" {image_name(image.name)}," for image in c.images), image_parameters(c)
     span = np.asarray(c.action.high) - np.asarray(c.action.low)
@@ -156,7 +159,7 @@ def _around(c: Contract, name: str) -> str:
             *begin,
             "}",
             "",
-            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[4])",
+            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[{size}])",
             "{",
             f"    {name}_status status;",
             *copies,
@@ -166,9 +169,9 @@ def _around(c: Contract, name: str) -> str:
             "    return status;",
             "}",
             "",
-            f"void {name}_command(const float action[4], float command[4])",
+            f"void {name}_command(const float action[{size}], float command[{size}])",
             "{",
-            "    for (int i = 0; i < 4; i++) {",
+            f"    for (int i = 0; i < {size}; i++) {{",
             "        const float a = action[i] < -1.0f ? -1.0f : action[i] > 1.0f ? 1.0f : action[i];",
             "        command[i] = low[i] + (a + 1.0f) / 2.0f * span[i];",
             "    }",

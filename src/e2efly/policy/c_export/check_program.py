@@ -5,7 +5,7 @@ import numpy as np
 from e2efly.policy.c_export.exact import Exact
 from e2efly.policy.c_export.header import Precision, image_name, image_size
 from e2efly.policy.c_export.text import array, comment, number
-from e2efly.policy.contract import ACTION_SIZE, Contract
+from e2efly.policy.contract import Contract
 from e2efly.policy.random_inputs import random_images, random_observations
 
 STEPS = 8
@@ -23,7 +23,8 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
     rng, exact = np.random.default_rng(0), Exact(contract, content)
     observation = random_observations(rng, contract.observation, STEPS)
     images = [random_images(rng, image, STEPS) for image in contract.images]
-    memory, actions = np.zeros((1, contract.memory_size)), np.empty((STEPS, ACTION_SIZE))
+    size = contract.action.size
+    memory, actions = np.zeros((1, contract.memory_size)), np.empty((STEPS, size))
     for k in range(STEPS):
         actions[k], memory = exact.act(observation[k : k + 1], [x[k : k + 1] for x in images], memory)
     given = "".join(f" {image_name(image.name)} + {image_size(image)} * (k % {STEPS})," for image in contract.images)
@@ -40,11 +41,11 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
             ),
             array("static const double", "wanted", map(repr, actions.reshape(-1).tolist())),
             f"static {name}_state state;\n",
-            f"static {name}_status step(int k, float action[4])\n{{",
+            f"static {name}_status step(int k, float action[{size}])\n{{",
             f"    return {name}_network(&state, observation + {contract.observation_size} * (k % {STEPS}),"
             f"{given} action);\n}}\n",
             "int main(void)\n{",
-            "    float action[4];",
+            f"    float action[{size}];",
             "    double worst = 0.0;",
             "    clock_t began;",
             f"    {name}_begin(&state);",
@@ -54,7 +55,8 @@ def check_source(contract: Contract, content: bytes, name: str, precision: Preci
             '            printf("step %d: status %d\\n", k, (int)status);',
             "            return 1;",
             "        }",
-            "        for (int i = 0; i < 4; i++) worst = fmax(worst, fabs((double)action[i] - wanted[4 * k + i]));",
+            f"        for (int i = 0; i < {size}; i++)",
+            f"            worst = fmax(worst, fabs((double)action[i] - wanted[{size} * k + i]));",
             "    }",
             "    began = clock();",
             f"    for (int k = 0; k < {ROUNDS}; k++) (void)step(k, action);",

@@ -28,7 +28,7 @@ class Exact:
     def act(
         self, observation: np.ndarray, images: Sequence[np.ndarray], memory: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Actions (n, 4) and next memories (n, k), float64, for observations (n, o), images and memories (n, k)."""
+        """Actions (n, c) and next memories (n, k), float64, for observations (n, o), images and memories (n, k)."""
         size = self.contract.memory_size
         fed = {INPUT: observation} | {image.name: x for image, x in zip(self.contract.images, images, strict=True)}
         fed |= {MEMORY: memory} if size else {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from e2efly.policy.c_export.text import comment, number, string
-from e2efly.policy.contract import ACTION_SIZE, Contract
+from e2efly.policy.contract import Contract
 from e2efly.policy.images import Image
 from e2efly.policy.observation import PAST_ACTIONS
 
@@ -38,7 +38,7 @@ class Sizes:
 
 def sizes(contract: Contract, scratch: int, constants: int, precision: Precision) -> Sizes:
     """The memory that a policy needs, from its contract, the count of scratch numbers and the bytes of constants."""
-    kept = contract.observation_size + contract.memory_size + ACTION_SIZE * contract.past_actions
+    kept = contract.observation_size + contract.memory_size + contract.action.size * contract.past_actions
     images = sum(image_size(image) for image in contract.images)
     width = BYTES[precision]
     state = -(-(width * max(scratch, 1) + BYTES["float"] * kept) // width) * width  # C aligns it
@@ -204,13 +204,13 @@ def _state(c: Contract, name: str, needs: Sizes, precision: Precision) -> str:
     if c.memory_size:
         lines.append(f"    float memory[{c.memory_size}];")
     if c.past_actions:
-        lines.append(f"    float past_actions[{ACTION_SIZE * c.past_actions}]; {comment('newest first')}")
+        lines.append(f"    float past_actions[{c.action.size * c.past_actions}]; {comment('newest first')}")
     lines += [f"    float observation[{c.observation_size}];", f"    {name}_real scratch[{max(needs.scratch, 1)}];"]
     return "\n".join([*lines, f"}} {name}_state;\n"])
 
 
 def _calls(c: Contract, name: str) -> str:
-    big, images = name.upper(), image_parameters(c)
+    big, images, size = name.upper(), image_parameters(c), c.action.size
     low, high = c.action.limits
     commands = "; ".join(
         f"{field} {a:g} to {b:g} {unit}"
@@ -234,14 +234,14 @@ def _calls(c: Contract, name: str) -> str:
             comment("The policy takes over: it has no memory yet, and is shown hovering actions as its last ones."),
             f"void {name}_begin({name}_state *state);\n",
             comment(
-                f"One step, {big}_CONTROL_RATE_HZ times a second: the action, of four numbers in "
+                f"One step, {big}_CONTROL_RATE_HZ times a second: the action, of {size} numbers in "
                 f"[{low:g}, {high:g}], for what is seen now. Memory and past actions go on in the state."
             ),
-            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[4]);\n",
+            f"{name}_status {name}_act({name}_state *state, const {name}_seen *seen,{images} float action[{size}]);\n",
             comment("The same from a whole observation, past actions included; those of the state stay as they are."),
             f"{name}_status {name}_network({name}_state *state, const float observation[{c.observation_size}],"
-            f"{images} float action[4]);\n",
+            f"{images} float action[{size}]);\n",
             comment(f"From action to command: {c.action.mapping}. {commands}."),
-            f"void {name}_command(const float action[4], float command[4]);\n",
+            f"void {name}_command(const float action[{size}], float command[{size}]);\n",
         ]
     )

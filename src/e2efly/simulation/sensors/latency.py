@@ -17,8 +17,8 @@ def frames(latency: float, period: float) -> int:
 
 
 def acting_commands(
-    queue: Float[Array, "n k 4"], latency: Float[Array, " n"], period: float
-) -> tuple[Float[Array, "n 4"], Float[Array, "n 4"], Float[Array, " n"]]:
+    queue: Float[Array, "n k c"], latency: Float[Array, " n"], period: float
+) -> tuple[Float[Array, "n c"], Float[Array, "n c"], Float[Array, " n"]]:
     """The two commands that act during the coming control period, and the time at which the second replaces the first.
 
     Args:

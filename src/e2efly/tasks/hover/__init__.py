@@ -37,7 +37,7 @@ class HoverConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.hover.goal:HoverGoal"
     route: ClassVar[str] = "e2efly.tasks.hover.goal:HoverRoute"
     shows_error: ClassVar = True
-    variants: ClassVar = ("thrown", "rotors")
+    variants: ClassVar = ("thrown", "rotors", "lost_rotor")
     smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
     best: ClassVar = "bptt"
     robust: ClassVar = {
@@ -61,6 +61,11 @@ class HoverConfig(TaskConfig):
         algo={"horizon": 160, "learning_rate": 6e-3, "average": 0.99},
         steps=30_000_000,
         chunk=150,
+    )
+    lost_rotor: ClassVar = Robust(
+        weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "upright": 0.1, "anglevxy_sq": 0.02, "act2_sq": 0.05},
+        algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
+        steps=4_000_000,
     )
     paper: ClassVar = Paper(
         weights={"prog2": 0.01, "ori2": 0.0001, "v1": 0.002, "anglev": 0.002},
@@ -145,12 +150,17 @@ class HoverConfig(TaskConfig):
         a height of 5 m: at 3 m, some starts hit the ground whatever the policy does (docs/tasks.md).
 
         `rotors`: hover by rotor thrusts at 100 Hz, with a memory, and with delays of up to 34 ms.
+
+        `lost_rotor`: a hexacopter stays at its place, although one of its rotors stops in nine of ten episodes. Its
+        heading is free.
         """
-        if preset == "rotors":
+        if preset in ("rotors", "lost_rotor"):
             if not isinstance(config.algo, BPTTConfig):
-                raise ValueError(f"preset 'rotors': accepted for hover by bptt; not by {config.algo.name}")
-            env = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.034))
-            return cls.rotors.into(dataclasses.replace(config, env=env))
+                raise ValueError(f"preset {preset!r}: accepted for hover by bptt; not by {config.algo.name}")
+            by_rotors = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.034))
+            loses = EnvConfig(vehicle="hexa", lost_rotor=0.9)
+            recipe, env = (cls.rotors, by_rotors) if preset == "rotors" else (cls.lost_rotor, loses)
+            return recipe.into(dataclasses.replace(config, env=env))
         thrown = cls(
             episode_s=3.0, judged_s=10.0, target=(0.0, 0.0, 5.0), velocity=3.0, tilt=math.pi, body_rate=6.0, fence=10.0
         )

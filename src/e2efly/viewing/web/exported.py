@@ -39,7 +39,7 @@ def still(env: Env) -> Env:
     env = dataclasses.replace(env, family=None, noise=None).undisturbed()
     imu = env.imu and dataclasses.replace(env.imu, **dict.fromkeys(NOISY, 0.0))
     late = np.full_like(env.observation_latency_range, np.mean(env.observation_latency_range))
-    exact: Any = {"disturbance": None, "estimate": None, "link": None}
+    exact: Any = {"disturbance": None, "estimate": None, "link": None, "lost_rotor": None}
     return held(dataclasses.replace(env, imu=imu, observation_latency_range=late, **exact))
 
 
@@ -63,6 +63,11 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
     """
     if env.agents > 1:
         raise ValueError(f"task.agents is {env.agents}; accepted: a task with one vehicle in a world: a page shows one")
+    if env.action_size != 4:
+        raise ValueError(
+            f"env.command_mode is {env.physics.command_mode!r} with {env.action_size} rotors; accepted: four commands, "
+            "as a page flies"
+        )
     begun = beginnings(env, starts)
     first = _row(begun, 0)
     given = named(first)
