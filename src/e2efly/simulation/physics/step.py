@@ -129,7 +129,7 @@ def step(
         physics: how to integrate and control.
         vehicle: the plant; any field may be batched. Its rate gain, integral gain and filter are those of the rate
             loop. For everything else the flight controller uses `physics.nominal`.
-        state: the state at the start of the step.
+        state: the state at the start of the step. A load that is part of it hangs from the vehicle.
         command: the command, in the units of the command mode.
         previous: the command that still acts before `switch_time`, for latencies that are not a whole number of steps.
         switch_time: time after the start of the step at which `command` replaces `previous`, s, in [0, control_period].
@@ -143,7 +143,7 @@ def step(
     state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
-    plant = Airframe.of(vehicle, dt, rotor_share, push)
+    plant = Airframe.of(vehicle, dt, rotor_share, push, state.load)
     controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
     after = split(command)
@@ -168,7 +168,7 @@ def step(
     loop = None if mode.controller is None else state.rate_loop
     start = Parts.of(state), jax.tree.map(Vec3.of, loop)
     (parts, loop), _ = jax.lax.scan(again, start, jnp.arange(physics.substeps))
-    end = parts.join()
+    end = parts.join(state.load)
     if loop is None:
         return dataclasses.replace(end, rate_loop=state.rate_loop)
     return dataclasses.replace(
