@@ -27,6 +27,7 @@ def check(
         posterior: the distribution from which an identified vehicle is drawn.
     """
     check_fields("env", config)
+    config.payload.check("env.payload")
     if body.rotor_count != 4 and COMMAND_MODES[config.command_mode].controller is None:
         modes = ", ".join(repr(mode.name) for mode in COMMAND_MODES.values() if mode.controller is not None)
         raise ValueError(
@@ -60,9 +61,10 @@ def check(
     if body.battery_voltage is not None or body.rotor_speed_ceiling is not None:
         drawn *= reached_share(body)
     if drawn < 1:
+        load = f", and env.payload has mass {config.payload.mass[1]:g}" if config.payload.mass[1] else ""
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
-            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}: the weakest vehicle of these "
+            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}{load}: the weakest vehicle of these "
             f"cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that "
             "leave at least 1"
         )
