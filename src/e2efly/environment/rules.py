@@ -5,6 +5,7 @@ import dataclasses
 from e2efly.config import EnvConfig, check_fields
 from e2efly.config.numbers import LATEST
 from e2efly.control import COMMAND_MODES
+from e2efly.simulation.physics.integrate import SWINGING
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
 from e2efly.vehicles.family import Family
@@ -28,6 +29,10 @@ def check(
     """
     check_fields("env", config)
     config.payload.check("env.payload")
+    if config.payload.mass[1] and config.integrator not in SWINGING:
+        raise ValueError(
+            f"env.integrator is {config.integrator!r}; accepted: {', '.join(SWINGING)}, as env.payload has a load"
+        )
     if body.rotor_count != 4 and COMMAND_MODES[config.command_mode].controller is None:
         modes = ", ".join(repr(mode.name) for mode in COMMAND_MODES.values() if mode.controller is not None)
         raise ValueError(

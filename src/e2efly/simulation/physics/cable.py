@@ -22,8 +22,7 @@ RESOLVED = 10
 the stretch in hover is g (1 + m / M) (RESOLVED h / 2 pi)^2 for sub-steps h: 0.9 mm at 5 ms and half of the vehicle's
 mass. It falls with the square of the sub-step."""
 DAMPING = 0.5
-"""Damping ratio of the stretching. Explicit Euler, the least stable of the integrators, needs more than pi / RESOLVED,
-which is 0.31."""
+"""Damping ratio of the stretching."""
 SHORTEST = 1e-6
 """Distances between hook and load count as at least this, m, where a direction is divided by them."""
 

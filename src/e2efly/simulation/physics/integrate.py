@@ -138,3 +138,5 @@ def _finish(parts: Parts, rotor_speed: Rotors) -> Parts:
 
 INTEGRATORS: dict[str, Integrator] = {"euler": euler, "semi_implicit": semi_implicit, "rk3": rk3, "rk4": rk4}
 """Integrators by name."""
+SWINGING = tuple(name for name in INTEGRATORS if name != "euler")
+"""Integrators with which a load may hang from the vehicle: explicit Euler adds energy to its swing."""

@@ -15,7 +15,7 @@ from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import reached
 from e2efly.simulation.physics.control import Command, control_law, remembered
-from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
+from e2efly.simulation.physics.integrate import INTEGRATORS, SWINGING, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, RateLoop, State, split
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
@@ -138,7 +138,12 @@ def step(
         wind: velocity of the air in the world, m/s.
         rotor_share: thrust of each rotor divided by the thrust from the vehicle's thrust map. None: 1.
         push: acceleration by a horizontal force from outside at the centre of mass, world, m/s^2. None: no such force.
+
+    Raises:
+        ValueError: for a load with an integrator that is not stable with it.
     """
+    if state.load is not None and physics.integrator not in SWINGING:
+        raise ValueError(f"integrator is {physics.integrator!r}; accepted with a load: {', '.join(SWINGING)}")
     mode = COMMAND_MODES[physics.command_mode]
     state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]

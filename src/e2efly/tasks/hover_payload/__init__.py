@@ -66,4 +66,4 @@ class HoverPayloadConfig(HoverConfig):
             return TrainConfig(cls(), PPOConfig(), RewardConfig(weights), env, network, steps=10_000_000)
         weights = {"prog2": 1.0, "near": 0.5, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.05}
         settings = BPTTConfig(horizon=96, learning_rate=8e-3, average=0.99)
-        return TrainConfig(cls(), settings, RewardConfig(weights), env, network, steps=4_000_000, chunk=30)
+        return TrainConfig(cls(), settings, RewardConfig(weights), env, network, steps=2_000_000, chunk=30)
