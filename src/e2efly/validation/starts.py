@@ -72,12 +72,17 @@ def draw_starts(env: Env, n: int, seed: int) -> Starts:
     """The first `n` starts of a seed. They are those of `e2efly eval`.
 
     Raises:
-        ValueError: for a task whose worlds have several vehicles: a plant flies one alone.
+        ValueError: for a task whose worlds have several vehicles: a plant flies one alone; and for a load.
     """
     if env.agents > 1:
         raise ValueError(
             f"task.agents is {env.agents}; accepted: a task with one vehicle in a world, as a plant flies one alone "
             "(`e2efly eval` flies worlds of several)"
+        )
+    if env.payload is not None:
+        raise ValueError(
+            f"env.payload has mass {env.payload.mass}; accepted: 0, 0, as no load hangs from the vehicle of a plant "
+            "(`e2efly eval` flies with loads)"
         )
     drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // BATCH))]
     vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)

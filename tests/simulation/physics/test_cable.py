@@ -75,8 +75,8 @@ def test_a_whirling_load_keeps_the_momenta_of_the_pair(stone: Vehicle, random_st
 
     moments = spin(path, path.load)
     np.testing.assert_allclose(moments, jnp.broadcast_to(spin(start, load), moments.shape), atol=1e-6)
-    stretch = jnp.linalg.norm(path.load.position - path.position - rotate(
-        path.quaternion, jnp.broadcast_to(jnp.array([0.0, 0.0, -hook]), path.position.shape)), axis=-1) - 0.5  # fmt: skip
+    hooked = path.position + rotate(path.quaternion, jnp.broadcast_to(jnp.array([0.0, 0.0, -hook]), momentum.shape))
+    stretch = jnp.linalg.norm(path.load.position - hooked, axis=-1) - 0.5
     cable = Airframe.of(stone, 2e-4, load=load).cable
     assert cable is not None
     energy = (

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("x64")
 
 MASS, LENGTH, HOOK, ANGLE = 0.25, 0.5, 0.04, 0.4
 THRUST = np.array([2.44, 2.46, 2.45, 2.44])
-"""Thrust of each rotor, N: hardly more than the weight of both, and hardly uneven, so that the vehicle tumbles slowly."""
+"""Thrust of each rotor, N: about the weight of both, and hardly uneven, so that the vehicle tumbles slowly."""
 
 
 def rotors(vehicle: Vehicle) -> tuple[str, str]:
@@ -50,9 +50,7 @@ def test_a_rod_on_a_ball_joint(vacuum: Vehicle) -> None:
         f'<body pos="0 0 {-HOOK}"><joint type="ball"/>'
         f'<inertial pos="0 0 {-LENGTH}" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/></body>'
     )
-    model, data = world(
-        f'<inertial pos="0 0 0" mass="{vacuum.mass}" diaginertia="{moments}"/>{sites}{rod}', actuators
-    )
+    model, data = world(f'<inertial pos="0 0 0" mass="{vacuum.mass}" diaginertia="{moments}"/>{sites}{rod}', actuators)
     data.qpos[7:] = Rotation.from_euler("y", -ANGLE).as_quat(scalar_first=True)
     for _ in range(round(1.0 / STEP)):
         mujoco.mj_step(model, data)

@@ -117,6 +117,8 @@ def _pushed(state: EnvState, push: Push) -> EnvState:
     s = replace(
         s, position=s.position + push.shift, velocity=s.velocity + push.speed, body_rate=s.body_rate + push.rate
     )
+    if s.load is not None:
+        s = replace(s, load=replace(s.load, position=s.load.position + push.shift))
     past = state.past
     if past is not None:
         past = replace(past, position=past.position + push.shift)
