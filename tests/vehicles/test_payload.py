@@ -25,7 +25,7 @@ source = "ruler"
 
 
 def test_it_is_the_body_of_all_its_points(vis_r: Vehicle) -> None:
-    """Six points that have the vehicle's mass and inertia, and the payload's: the sums over all seven are the body's."""
+    """Six points with the vehicle's mass and inertia, and the payload's: the sums over all seven are the body's."""
     half = np.sqrt((vis_r.inertia.sum() / 2 - vis_r.inertia) * 3 / vis_r.mass)
     points = np.concatenate([np.diag(half), -np.diag(half), [PLACE]])
     masses = np.append(np.full(6, vis_r.mass / 6), 0.3)

@@ -69,7 +69,7 @@ def check(
         load = f", and env.payload has mass {config.payload.mass[1]:g}" if config.payload.mass[1] else ""
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
-            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}{load}: the weakest vehicle of these "
-            f"cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that "
-            "leave at least 1"
+            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}{load}: the weakest vehicle of "
+            f"these cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws "
+            "that leave at least 1"
         )
