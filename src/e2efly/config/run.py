@@ -230,8 +230,6 @@ class TaskConfig:
     """Label in the plots for the place that the vehicle must reach."""
     shows_error: ClassVar[bool] = False
     """Whether the curves of an ablation show the error, as in the paper. Otherwise they show the success rate."""
-    carries: ClassVar[bool] = False
-    """Whether it judges the load that hangs from the vehicle, so that `EnvConfig.payload` must have one."""
     variants: ClassVar[tuple[str, ...]] = ()
     """Presets of its own, in addition to `robust`, `nominal` and `paper`."""
     asked: ClassVar[Mapping[tuple[str, str], str]] = {}

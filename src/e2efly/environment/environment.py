@@ -186,11 +186,6 @@ class Env:
             raise ValueError(
                 f"env.downwash is {config.downwash}; accepted: 0, as a world of {task.name} has one vehicle"
             )
-        if task.carries and not config.payload.mass[1]:
-            raise ValueError(
-                f"env.payload.mass is {config.payload.mass}; accepted: two rising numbers from "
-                f"{config.payload.LIGHTEST:g}, as {task.name} judges where the load is"
-            )
         return Env(
             physics=physics,
             task=flown_task,

@@ -31,7 +31,6 @@ class HoverPayloadConfig(HoverConfig):
     world: ClassVar[str] = "e2efly.tasks.hover_payload.world:HoverPayload"
     goal_class: ClassVar[str] = "e2efly.tasks.hover_payload.goal:HoverPayloadGoal"
     route: ClassVar[str] = "e2efly.tasks.hover_payload.goal:HoverPayloadRoute"
-    carries: ClassVar = True
     shows_error: ClassVar = False
     variants: ClassVar = ()
     smooth: ClassVar = None
