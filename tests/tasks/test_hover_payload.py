@@ -15,6 +15,7 @@ from e2efly.policy.goal import Shape
 from e2efly.runs import presets
 from e2efly.simulation.physics import Load, State
 from e2efly.tasks.hover_payload.goal import HoverPayloadRoute
+from e2efly.validation.evaluation import candidate
 from e2efly.validation.starts import draw_starts
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.web.exported import course
@@ -155,3 +156,8 @@ def test_a_flight_hovers_a_cables_length_over_the_loads_place() -> None:
     placed = route.course(Shape(VEHICLE.feet_height, VEHICLE.radius), 1 / 30)
     np.testing.assert_allclose(placed.goal.goal(placed.memory, np.zeros(1))[0], [1.0, 2.0, 1.1])
     assert [part.name for part in route.domain()] == ["cable_length"]
+
+
+def test_a_policy_alone_flies_with_loads() -> None:
+    """The zoo's policy has no run beside it: `eval` and `watch` hang the loads of the preset from its vehicle."""
+    assert candidate("hover_payload").env.payload == CONFIG.env.payload
