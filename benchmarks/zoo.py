@@ -63,7 +63,10 @@ from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
 VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors")}
 """Policies of a task by a preset of its own: task and preset."""
-ALONE = {"race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_rotors": presets.FAMILY}
+ALONE = {
+    "race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_payload": USUAL,
+    "hover_rotors": presets.FAMILY,
+}  # fmt: skip
 """For this vehicle alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
@@ -112,8 +115,8 @@ def measured(task: str, known: Collection[str] = ()) -> tuple[str, ...]:
 def recipe(vehicle: str, task: str) -> tuple[str, str]:
     """The task that a policy is of, and the preset by which it is learned; empty: the one that `train` takes."""
     kind, own = VARIANTS.get(task, (task, ""))
-    robust = vehicle not in family_names() and TASKS[kind].best in TASKS[kind].robust
-    return kind, own or ("robust" if robust else "")
+    alone = presets.ROBUST if TASKS[kind].best in TASKS[kind].robust else presets.NOMINAL
+    return kind, own or ("" if vehicle in family_names() else alone)
 
 
 def trained(vehicle: str, task: str, algo: str, seed: int, out: Path) -> None:

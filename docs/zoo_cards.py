@@ -31,6 +31,7 @@ TASKS = {
     "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "gap": "Fly through a narrow tilted slit, banked.",
     "hover_aware": "Fly to a point and keep a moving ball in view.",
+    "hover_payload": "Hold a load, which hangs on a cable and is not seen, at a place.",
     "dodge": "Hover, and dodge balls that are thrown at 8 m/s, which only a depth camera shows.",
     "land_visual": "Land on a pad that only a camera shows.",
     "avoid": "Fly fast through a forest that only a depth camera shows.",

@@ -48,7 +48,10 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             ["train", "hoover"],
             "unknown task 'hoover'; did you mean 'hover'? (there are: avoid, avoid_together, dodge, gap, hall, hover, ",
         ),
-        (["train"], "train needs a task first: avoid, avoid_together, dodge, gap, hall, hover, hover_aware, land"),
+        (
+            ["train"],
+            "train needs a task first: avoid, avoid_together, dodge, gap, hall, hover, hover_aware, hover_payload",
+        ),
         (["train", "hover", "--algo", "bppt"], "unknown algorithm 'bppt'; did you mean 'bptt'?"),
         (["train", "hover", "--preset", "papr"], "unknown preset 'papr'; did you mean 'paper'?"),
         (["train", "hover", "--vehicle", "vis_x"], "unknown vehicle 'vis_x'; did you mean 'vis_r'?"),

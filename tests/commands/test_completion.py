@@ -33,7 +33,7 @@ def test_it_is_a_script_and_knows_every_command(bash: Path) -> None:
     ("line", "offered"),
     [
         ("e2efly tr", ["train"]),
-        ("e2efly train ho", ["hover", "hover_aware"]),
+        ("e2efly train ho", ["hover", "hover_aware", "hover_payload"]),
         ("e2efly train race --task.tr", ["--task.track"]),  # an option of a task that is not the usual one
         ("e2efly train hover --algo pp", ["ppo"]),
         ("e2efly train hover --vehicle craz", ["crazyflie"]),

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from e2efly.config import PayloadConfig
 from e2efly.control import Quat
 from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
@@ -285,7 +286,8 @@ def test_what_to_look_at_circles_the_target(contracts: dict[str, Contract]) -> N
 def test_what_training_shows_and_judges_flight_shows_and_judges(task: str) -> None:
     """The same code in NumPy and float64: fields, errors and verdicts of 64 vehicles that fly until they fail."""
     config = presets.preset(task, "ppo")
-    env = Env.of(next(iter(config.task.criteria().values())), config.reward, config.env)
+    measured = dataclasses.replace(config.env, payload=PayloadConfig())  # in flight nothing measures a load
+    env = Env.of(next(iter(config.task.criteria().values())), config.reward, measured)
     n, world = 64, env.task
     state, _ = jax.jit(env.reset, static_argnums=1)(random_key(0), n)
     lean = course_of(world, jax.tree.map(np.asarray, state.memory), np.zeros(3)).goal

@@ -113,7 +113,7 @@ def test_a_heading_is_kept_only_where_the_task_names_one() -> None:
 @pytest.mark.parametrize("task", ["gap", "avoid", "land_visual"])
 def test_a_task_without_a_place_to_fly_to_is_named(task: str) -> None:
     with pytest.raises(
-        ValueError, match=rf"'geometric', and task '{task}'.*hover, hover_aware, land, race, swap, track"
+        ValueError, match=rf"'geometric', and task '{task}'.*hover, hover_aware, hover_payload, land, race, swap, track"
     ):
         candidate(task, baseline="geometric")
 

@@ -24,6 +24,7 @@ from e2efly.config.env import (
     ImuConfig,
     LinkConfig,
     NoiseConfig,
+    PayloadConfig,
 )
 from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.random_worlds import CLUTTER, ClutterConfig, ForestConfig
@@ -60,6 +61,7 @@ __all__ = [
     "NoiseConfig",
     "PPOConfig",
     "Paper",
+    "PayloadConfig",
     "RewardConfig",
     "Robust",
     "SHACConfig",

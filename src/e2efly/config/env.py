@@ -3,8 +3,9 @@
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
+from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import ANGLE, BODY_RATE, LATEST, SPEED, number, shape
 
 
@@ -100,6 +101,40 @@ class LinkConfig:
     """Share of the control steps whose command is lost."""
     silence: float = number(0.0, high=10.0)
     """How long all commands are lost, s, once in every three seconds."""
+
+
+@dataclass(frozen=True)
+class PayloadConfig:
+    """A load that hangs from the vehicle on a cable. Every episode draws its own."""
+
+    mass: tuple[float, float] = number((0.0, 0.0), high=1.0, rising=True)
+    """Mass of the load relative to the vehicle's, uniform. 0, 0: no load."""
+    length: tuple[float, float] = number((0.5, 0.5), low=0.1, high=10.0, rising=True)
+    """Length of the cable, m, uniform."""
+    hook: float = number(0.0, high=1.0)
+    """Distance of the cable's upper end below the vehicle's centre of mass, m."""
+    swing: float = number(0.0, high=ANGLE / 2)
+    """Largest angle of the cable from the vertical at the start, rad: uniform in a disc."""
+
+    def domain(self) -> Domain:
+        """The loads that episodes draw."""
+        if not self.mass[1]:
+            return ()
+        return extent("load_mass", "1", self.mass), extent("cable_length", "m", self.length)
+
+    LIGHTEST: ClassVar[float] = 0.01
+    """Smallest accepted mass of a load relative to the vehicle's."""
+
+    def check(self, name: str) -> None:
+        """A load has a mass.
+
+        Raises:
+            ValueError: naming the field, the value and what is accepted.
+        """
+        if self.mass[1] and self.mass[0] < self.LIGHTEST:
+            raise ValueError(
+                f"{name}.mass is {self.mass}; accepted: 0, 0 for no load, or two rising numbers from {self.LIGHTEST:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -263,6 +298,8 @@ class EnvConfig:
     """Late, turned, jumping and repeated poses."""
     link: LinkConfig = shape(LinkConfig(), added=True)
     """Lost commands."""
+    payload: PayloadConfig = shape(PayloadConfig(), added=True)
+    """A load on a cable."""
     imu: ImuConfig = ImuConfig()
     """The IMU."""
     cameras: tuple[CameraConfig, ...] = ()
@@ -274,4 +311,4 @@ class EnvConfig:
     def weakest(self) -> float:
         """The smallest thrust-to-weight ratio that an episode can have, relative to that of the vehicle's file."""
         lost = self.randomize.get("thrust_map", 0.0)
-        return (1 - lost) * self.disturbance.weakest / (1 + self.randomize.get("mass", 0.0))
+        return (1 - lost) * self.disturbance.weakest / (1 + self.randomize.get("mass", 0.0) + self.payload.mass[1])

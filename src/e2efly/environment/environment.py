@@ -25,13 +25,14 @@ from e2efly.config import (
     ImuConfig,
     LinkConfig,
     NoiseConfig,
+    PayloadConfig,
     RewardConfig,
     TaskConfig,
 )
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
 from e2efly.control.vectors import unrotate
-from e2efly.environment import air, disturbance, expert, lost_commands, lost_rotor, pose_errors
+from e2efly.environment import air, disturbance, expert, lost_commands, lost_rotor, payloads, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
 from e2efly.environment.env_state import (
@@ -88,7 +89,7 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
     data_fields=[
         "physics", "task", "weights", "parameters", "center", "half", "hover", "latency_range",
         "observation_latency_range", "randomize", "posterior", "wind", "downwash", "cushion", "lost_rotor",
-        "lost_rotor_time", "disturbance", "estimate", "link", "noise", "imu", "cameras",
+        "lost_rotor_time", "disturbance", "estimate", "link", "noise", "payload", "imu", "cameras",
     ],
     meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
 )  # fmt: skip
@@ -126,6 +127,7 @@ class Env:
     estimate: EstimateConfig | None
     link: LinkConfig | None
     noise: NoiseConfig | None
+    payload: PayloadConfig | None
     imu: ImuConfig | None
     cameras: tuple[CameraConfig, ...]
     queue: int
@@ -209,6 +211,7 @@ class Env:
             estimate=None if config.estimate == EstimateConfig() else config.estimate,
             link=None if config.link == LinkConfig() else config.link,
             noise=config.noise if noisy else None,
+            payload=config.payload if config.payload.mass[1] else None,
             imu=config.imu if config.imu.observed else None,
             cameras=config.cameras,
             queue=max(frames + 1, seen, 2),
@@ -444,7 +447,7 @@ class Env:
             actions=actions,
             disturbance=disturbed,
             link=linked,
-            past=None if state.past is None else pushed(state.past, after),
+            past=None if state.past is None else pushed(state.past, dataclasses.replace(after, load=None)),
             imu=inertial,
             tick=state.tick + 1,
         )
@@ -503,8 +506,11 @@ class Env:
         vehicle = dataclasses.replace(vehicle, rotor_speed=rotor_speed)
         vehicle = jax.tree.map(lambda x: x.astype(dtype), started(self.physics, flown, vehicle))
         past = None
-        if self.past:
+        if self.past:  # no observation shows the load
             past = jax.tree.map(lambda x: jnp.broadcast_to(x[:, None], (n, self.past, *x.shape[1:])), vehicle)
+        if self.payload is not None:
+            load = payloads.draw(self.payload, jax.random.fold_in(plant_key, 4), vehicle, flown.mass)
+            vehicle = dataclasses.replace(vehicle, load=load)
         actions = jnp.broadcast_to(self.hover, (n, self.queue, self.action_size)).astype(dtype)
         estimate_key, link_key = (jax.random.fold_in(observation_key, i) for i in (1, 2))
         return EnvState(

@@ -4,6 +4,7 @@ import dataclasses
 
 from e2efly.config import EnvConfig, check_fields
 from e2efly.config.numbers import LATEST
+from e2efly.simulation.physics.integrate import SWINGING
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
 from e2efly.vehicles.family import Family
@@ -26,6 +27,11 @@ def check(
         posterior: the distribution from which an identified vehicle is drawn.
     """
     check_fields("env", config)
+    config.payload.check("env.payload")
+    if config.payload.mass[1] and config.integrator not in SWINGING:
+        raise ValueError(
+            f"env.integrator is {config.integrator!r}; accepted: {', '.join(SWINGING)}, as env.payload has a load"
+        )
     check_widths(body, config.randomize, "env.randomize")
     latest = vehicle.latency if family is None else family.ranges.latency[1]
     if config.action_latency is None and latest + config.latency_spread[1] > LATEST:
@@ -53,9 +59,10 @@ def check(
     if body.battery_voltage is not None or body.rotor_speed_ceiling is not None:
         drawn *= reached_share(body)
     if drawn < 1:
+        load = f", and env.payload has mass {config.payload.mass[1]:g}" if config.payload.mass[1] else ""
         raise ValueError(
             f"env.randomize is {dict(config.randomize)} and env.disturbance has thrust {d.thrust:g}, "
-            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}: the weakest vehicle of these "
-            f"cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws that "
-            "leave at least 1"
+            f"rotor {d.rotor:g}, sag {d.sag:g}, ceiling {d.ceiling:g}, push {d.push:g}{load}: the weakest vehicle of "
+            f"these cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws "
+            "that leave at least 1"
         )

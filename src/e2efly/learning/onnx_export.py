@@ -54,6 +54,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
     actor = Actor.of(env.fields, env.cameras, config.network)
     latency = _decimals(env.latency_range)
     limits = (tuple(map(float, low)), tuple(map(float, high)))
+    courses = config.task.domain()
     return Contract(
         contract_version=CONTRACT_VERSION,
         e2efly_version=__version__,
@@ -71,7 +72,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         memory_size=config.network.recurrent,
         action=Action(mode.name, mode.fields, mode.units, *limits),
         hover_action=_decimals(env.hover),
-        courses=config.task.domain(),
+        courses=None if courses is None else (*courses, *config.env.payload.domain()),
         sensing=sensing_of(about, latency, float(rate)),
     )
 

@@ -203,7 +203,8 @@ def _adaptive(task: type[TaskConfig], config: TrainConfig, name: str) -> TrainCo
         for c in config.env.cameras
     )
     env = AROUND if name == IDENTIFIED else OTHERS
-    return given.into(dataclasses.replace(config, env=dataclasses.replace(env, cameras=cameras)))
+    env = dataclasses.replace(env, cameras=cameras, payload=config.env.payload)
+    return given.into(dataclasses.replace(config, env=env))
 
 
 def _having(recipes: str) -> str:

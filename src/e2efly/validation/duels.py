@@ -88,7 +88,7 @@ def duel(
     if not hasattr(found.task, "agents") or not hasattr(found.task, "laps"):
         raise ValueError(f"--rival is given for a policy of {found.task.name}; accepted: a policy of race_duel")
     other = candidate(rival)
-    asked = changed(found.task, task or {}, "task")
+    asked: Any = changed(found.task, task or {}, "task")
     laps = LAPS if load_track(asked.track).closed else 1
     flown = changed(asked, {"laps": laps, "episode_s": LONGEST} | dict(task or {}), "task")
     (suite,) = flown.criteria().values()
@@ -130,7 +130,7 @@ def _raced(
     rows = np.arange(n) % env.agents
     whose = [np.flatnonzero(rows == 0), np.flatnonzero(rows > 0)]
     memories = [act.begin(len(mine)) for act, mine in zip(acts, whose, strict=True)]
-    time, action = np.full(n, np.inf), np.zeros((n, env.action_size), np.float32)
+    time, action, race = np.full(n, np.inf), np.zeros((n, env.action_size), np.float32), state.memory
     for _ in range(env.episode_steps):
         seen = np.asarray(observation)
         for i, (act, mine, given) in enumerate(zip(acts, whose, columns, strict=True)):

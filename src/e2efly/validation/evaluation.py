@@ -447,7 +447,8 @@ def check_observation(policy: Acting, env: Any) -> None:
 
 
 def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[TaskConfig, EnvConfig]:
-    """Task and environment from the contract of a policy.onnx without a run. The task has the options of its preset.
+    """Task and environment from the contract of a policy.onnx without a run. The task, and the loads that hang
+    from its vehicles, have the options of its preset.
 
     `vehicle` is the vehicle that is to fly. It may be the file of the vehicle that the policy was trained on.
 
@@ -466,6 +467,7 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
             "on other parameters; accepted: the file of that vehicle with --vehicle FILE.toml, or its run's folder"
         )
     latency = c.latency_range_s[0], c.latency_range_s[1]
+    preset = presets.preset(c.task, "ppo")
     one = c.vehicle_ranges is not None and name != vehicle and vehicle is not None
     config = EnvConfig(
         vehicle=name,
@@ -475,10 +477,11 @@ def config_from_contract(policy: Policy, vehicle: str | None = None) -> tuple[Ta
         observation_latency=(c.observation_latency_range_s[0], c.observation_latency_range_s[1]),
         command_range=c.action.command_range,
         past_actions=c.past_actions,
+        payload=preset.env.payload,
         imu=ImuConfig(observed=c.sees_imu),
         cameras=tuple(_camera(image) for image in c.images),
     )
-    return presets.preset(c.task, "ppo").task, config
+    return preset.task, config
 
 
 def _camera(image: Image) -> CameraConfig:

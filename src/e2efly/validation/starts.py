@@ -77,10 +77,15 @@ def draw_starts(env: Env, n: int, seed: int) -> Starts:
     """The first `n` starts of a seed. They are those of `e2efly eval`.
 
     Raises:
-        ValueError: for a number of vehicles that is not that of whole worlds.
+        ValueError: for a number of vehicles that is not that of whole worlds, and for a load.
     """
     if n % env.agents:
         raise ValueError(f"{n} starts; accepted: a multiple of {env.agents}, the vehicles of a world")
+    if env.payload is not None:
+        raise ValueError(
+            f"env.payload has mass {env.payload.mass}; accepted: 0, 0, as no load hangs from the vehicle of a plant "
+            "(`e2efly eval` flies with loads)"
+        )
     drawn = [_draw(env, random_key(seed, UNSEEN, i)) for i in range(-(-n // env.whole(BATCH)))]
     vehicle, memory, eyes = jax.tree.map(lambda *x: np.concatenate(x)[:n], *drawn)
     fields = (vehicle.position, vehicle.velocity, vehicle.quaternion, vehicle.body_rate)

@@ -9,6 +9,7 @@ import numpy as np
 
 from e2efly.config.names import nearest, unknown
 from e2efly.config.tables import read_table, shown
+from e2efly.vehicles.payload import FixedPayload, with_payload
 from e2efly.vehicles.vehicle import ROTOR_COUNTS, MixerRule, Vehicle, has_shape, quantities, terms
 from e2efly.vehicles.vehicle_rules import check
 
@@ -34,6 +35,10 @@ values (`e2efly.vehicles.posterior`)."""
 
 MIXER = "mixer"
 """The key of a vehicle file that is no quantity: the rule of the flight controller's mixer, a text."""
+
+
+PAYLOAD = "payload"
+"""The table of a vehicle file that describes what is fixed to the vehicle. The other values are those without it."""
 
 
 def vehicle_names() -> list[str]:
@@ -73,8 +78,17 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
             f"{', '.join(vehicle_names())}, or the path of a .toml file"
         )
     table.pop(CORRELATION, None)
+    payload = table.pop(PAYLOAD, None)
     mixer = _read_mixer(where, table.pop(MIXER, ""))
     vehicle = Vehicle(name=path.stem, mixer=mixer, **read_values(table, (*quantities(), *terms()), where))
+    if payload is not None:
+        if not isinstance(payload, dict):
+            raise ValueError(f"{where}: {PAYLOAD} is {shown(payload)}; accepted: the tables mass and position")
+        fixed = read_values(payload, dataclasses.fields(FixedPayload), f"{where}: {PAYLOAD}")
+        try:
+            vehicle = with_payload(vehicle, **fixed)
+        except ValueError as error:
+            raise ValueError(f"{where}: {error}") from None
     check(vehicle, where)
     return vehicle
 
@@ -179,4 +193,4 @@ def read_sigmas(name_or_path: str | Path) -> dict[str, np.ndarray]:
 def sigmas_of(vehicle: Vehicle, table: dict[str, Any], where: str) -> dict[str, np.ndarray]:
     """The same as `read_sigmas`, for a file that was already read."""
     fields = quantities(vehicle)
-    return {f.name: _read_sigma(where, f, table[f.name], np.shape(getattr(vehicle, f.name))) for f in fields}
+    return {f.name: _read_sigma(where, f, table.get(f.name, {}), np.shape(getattr(vehicle, f.name))) for f in fields}

@@ -24,14 +24,14 @@ ROTOR_COUNTS = range(4, 17)
 """Accepted numbers of rotors. Fewer than four do not give independent thrust, roll, pitch and yaw."""
 
 
-def _quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
-    """A value of a vehicle: its unit, its shape, and the bound that every entry must satisfy."""
+def quantity(unit: str, shape: tuple[int, ...] = (), at_least: float | None = None, above: float | None = None) -> Any:
+    """A value of a vehicle file: its unit, its shape, and the bound that every entry must satisfy."""
     return field(metadata={"unit": unit, "shape": shape, "at_least": at_least, "above": above})
 
 
 def _per_rotor(unit: str, components: tuple[int, ...] = ()) -> Any:
     """A value for each rotor: one number, or as many as one of `components`. Its `shape` is that of a quadrotor."""
-    metadata = _quantity(unit, (4, *components[:1])).metadata
+    metadata = quantity(unit, (4, *components[:1])).metadata
     return field(metadata={**metadata, "per_rotor": components})
 
 
@@ -43,7 +43,7 @@ def _term(
     per_rotor: tuple[int, ...] | None = None,
 ) -> Any:
     """A value that a vehicle file may leave out. The physics then does not have the effect that it describes."""
-    metadata = _quantity(unit, shape, at_least, above).metadata
+    metadata = quantity(unit, shape, at_least, above).metadata
     return field(default=None, metadata=metadata if per_rotor is None else {**metadata, "per_rotor": per_rotor})
 
 
@@ -56,53 +56,53 @@ class Vehicle:
 
     name: str = field(metadata={"static": True})
     """The name of the vehicle: the stem of its file name."""
-    mass: Any = _quantity("kg", above=0.0)
+    mass: Any = quantity("kg", above=0.0)
     """Mass."""
-    inertia: Any = _quantity("kg*m^2", (3,), above=0.0)
+    inertia: Any = quantity("kg*m^2", (3,), above=0.0)
     """Moments of inertia about the body axes. They are the whole inertia tensor if `inertia_products` is left out."""
     rotor_position: Any = _per_rotor("m", (2, 3))
     """Rotor positions in the body's x-y plane, (N, 2), or in space, (N, 3). Without a height they are in that plane."""
     rotor_spin: Any = _per_rotor("1")
     """Sign of each rotor's reaction torque about its axis, (N,)."""
-    thrust_map: Any = _quantity("N*s^2/rad^2, N*s/rad, N", (3,))
+    thrust_map: Any = quantity("N*s^2/rad^2, N*s/rad, N", (3,))
     """Thrust of a rotor = k2 W^2 + k1 W + k0 at rotor speed W, never below zero. Order: [k2, k1, k0]."""
-    torque_ratio: Any = _quantity("m", at_least=0.0)
+    torque_ratio: Any = quantity("m", at_least=0.0)
     """Reaction torque of a rotor divided by its thrust."""
-    rotor_thrust_max: Any = _quantity("N", above=0.0)
+    rotor_thrust_max: Any = quantity("N", above=0.0)
     """Largest thrust of one rotor. The tighter one of this limit and `rotor_speed_max` applies."""
-    rotor_speed_max: Any = _quantity("rad/s", above=0.0)
+    rotor_speed_max: Any = quantity("rad/s", above=0.0)
     """Largest rotor speed."""
-    rotor_speed_min: Any = _quantity("rad/s", at_least=0.0)
+    rotor_speed_min: Any = quantity("rad/s", at_least=0.0)
     """Idle rotor speed."""
-    motor_time_constant: Any = _quantity("s", above=0.0)
+    motor_time_constant: Any = quantity("s", above=0.0)
     """Time constant of the first-order motor lag."""
-    drag_linear: Any = _quantity("N*s/m", (3,), at_least=0.0)
+    drag_linear: Any = quantity("N*s/m", (3,), at_least=0.0)
     """Drag divided by air-relative speed, per body axis."""
-    drag_quadratic: Any = _quantity("N*s^2/m^2", (3,), at_least=0.0)
+    drag_quadratic: Any = quantity("N*s^2/m^2", (3,), at_least=0.0)
     """Drag divided by the signed square of the air-relative speed, per body axis."""
-    body_rate_max: Any = _quantity("rad/s", (3,), above=0.0)
+    body_rate_max: Any = quantity("rad/s", (3,), above=0.0)
     """Largest commanded body rates."""
-    rate_gain: Any = _quantity("1/s", (3,), above=0.0)
+    rate_gain: Any = quantity("1/s", (3,), above=0.0)
     """Commanded angular acceleration divided by the body-rate error."""
-    attitude_gain: Any = _quantity("1/s", (2,), above=0.0)
+    attitude_gain: Any = quantity("1/s", (2,), above=0.0)
     """Commanded body rate divided by the attitude error: [tilt, yaw]."""
-    velocity_gain: Any = _quantity("1/s", (3,), above=0.0)
+    velocity_gain: Any = quantity("1/s", (3,), above=0.0)
     """Commanded acceleration divided by the velocity error, world axes."""
-    position_gain: Any = _quantity("1/s", (3,), above=0.0)
+    position_gain: Any = quantity("1/s", (3,), above=0.0)
     """Commanded velocity divided by the position error, world axes."""
-    tilt_max: Any = _quantity("rad", above=0.0)
+    tilt_max: Any = quantity("rad", above=0.0)
     """Largest tilt that the controllers command. It must be below pi/2."""
-    acceleration_max: Any = _quantity("m/s^2", (3,), above=0.0)
+    acceleration_max: Any = quantity("m/s^2", (3,), above=0.0)
     """Largest commanded acceleration, world axes."""
-    speed_max: Any = _quantity("m/s", (3,), above=0.0)
+    speed_max: Any = quantity("m/s", (3,), above=0.0)
     """Largest commanded velocity, world axes."""
-    control_rate: Any = _quantity("Hz", at_least=0.1)
+    control_rate: Any = quantity("Hz", at_least=0.1)
     """Rate at which the policy is called."""
-    latency: Any = _quantity("s", at_least=0.0)
+    latency: Any = quantity("s", at_least=0.0)
     """Time from the policy's observation to the arrival of its command at the rate loop."""
-    feet_height: Any = _quantity("m", above=0.0)
+    feet_height: Any = quantity("m", above=0.0)
     """Height of the centre of mass above the feet."""
-    radius: Any = _quantity("m", above=0.0)
+    radius: Any = quantity("m", above=0.0)
     """Radius of the sphere that encloses the vehicle, for collisions."""
     rotor_inertia: Any = _term("kg*m^2", at_least=0.0)
     """Moment of inertia about the rotor axis of one rotor, including everything that turns with it."""

@@ -15,6 +15,7 @@ from e2efly.simulation.physics import INTEGRATORS, State
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import derivative, rotor_speed_for
 from e2efly.simulation.physics.state import Parts, split
+from e2efly.vehicles.payload import with_payload
 from e2efly.vehicles.vehicle import Vehicle
 
 pytestmark = pytest.mark.usefixtures("x64")
@@ -120,6 +121,35 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
     turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
     np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
     np.testing.assert_allclose(end.velocity, data.qvel[:3] + turn.apply(np.cross(data.qvel[3:], away)), atol=1e-6)
+    np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
+
+
+def test_a_payload_that_is_fixed(vacuum: Vehicle, random_state: Callable[..., State]) -> None:
+    """MuJoCo is told of two bodies that are welded together, and puts them together itself."""
+    mass, place, thrust = 0.25, np.array([0.02, -0.01, -0.06]), np.array([2.4, 2.6, 2.7, 2.5])
+    sites, actuators = "", ""
+    for i, (x, y) in enumerate(vacuum.rotor_position):
+        sites += f'<site name="rotor_{i}" pos="{x} {y} 0"/>'
+        gear = f"0 0 1 0 0 {vacuum.rotor_spin[i] * vacuum.torque_ratio}"
+        actuators += f'<general site="rotor_{i}" gear="{gear}" biastype="affine" biasprm="{thrust[i]} 0 0"/>'
+    there, moments = (" ".join(map(str, x)) for x in (place, vacuum.inertia))
+    model, data = world(
+        f'<inertial pos="0 0 0" mass="{vacuum.mass}" diaginertia="{moments}"/>{sites}'
+        f'<body pos="{there}"><inertial pos="0 0 0" mass="{mass}" diaginertia="1e-12 1e-12 1e-12"/></body>',
+        f"<actuator>{actuators}</actuator>",
+    )
+    vehicle, start = with_payload(vacuum, mass, place), random_state(9)
+    away, turn = vehicle.centre_of_mass, Rotation.from_quat(np.array(start.quaternion), scalar_first=True)
+    data.qpos[:3] = start.position - turn.apply(away)
+    data.qpos[3:] = start.quaternion
+    data.qvel[:3] = start.velocity - turn.apply(np.cross(start.body_rate, away))
+    data.qvel[3:] = start.body_rate
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    speed = rotor_speed_for(vehicle, split(jnp.asarray(thrust)))
+    end = flown(vehicle, dataclasses.replace(start, rotor_speed=jnp.stack(speed)), 2000)
+    turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
+    np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
     np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
 
 

@@ -5,17 +5,19 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
+import viser
 
 from e2efly.environment import Env, random_key
 from e2efly.validation.evaluation import act_of, candidate
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.simulation import Hands, Simulation, held, under
+from e2efly.viewing.watch.viewer import Viewer
 
 
-def simulation(count: int = 2) -> Simulation:
+def simulation(count: int = 2, task: str = "hover") -> Simulation:
     """Hovering vehicles."""
-    found = candidate("hover")
-    suite = found.task.criteria()["hover"]
+    found = candidate(task)
+    suite = found.task.criteria()[task]
     return Simulation(found.environment(suite), found.flown.body, suite, act_of(found.policy), count)
 
 
@@ -110,3 +112,17 @@ def test_what_stands_is_drawn_once_per_world() -> None:
     assert len(stage.bodies) == 4  # gates
     assert [thing.text for thing in stage.things if hasattr(thing, "text")] == ["1", "2", "3", "4"]
     assert isinstance(source.env, Env)
+
+
+def test_a_load_is_shown_where_it_hangs_and_moves_with_the_world() -> None:
+    """The page draws it and its cable; a moved goal takes it along with its vehicle."""
+    flown = simulation(task="hover_payload")
+    viewer = Viewer(viser.ViserServer(port=0, verbose=False), 2)
+    for _ in range(2):
+        frame = flown.step(0)
+        assert frame.load is not None
+        assert np.all(np.linalg.norm(frame.load - frame.position, axis=1) < 1.01)
+        viewer.show(flown.stage_of(0), flown.origin, frame, 0.1)
+        np.testing.assert_allclose(viewer._load.position, frame.load[0] + viewer._offset, atol=1e-5)
+        flown.move(np.array([5.0, 0.0, 0.0]))
+    viewer.server.stop()

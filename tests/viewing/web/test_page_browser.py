@@ -189,8 +189,8 @@ def test_every_world_of_a_task_is_tested() -> None:
     assert {TASKS[name].world for name in tested} == {task.world for task in alone}
 
 
-STATED = ("avoid", "dodge", "hall", "land_visual", "race_clutter", "race_speed")
-"""Tasks of cameras, whose worlds fly without them, too, and of random worlds."""
+STATED = ("avoid", "dodge", "hall", "hover_payload", "land_visual", "race_clutter", "race_speed")
+"""Tasks of cameras and of loads, whose worlds fly without them, too, and of random worlds."""
 
 
 @pytest.mark.whole

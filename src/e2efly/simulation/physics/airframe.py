@@ -8,6 +8,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.control.vectors import Vec3
+from e2efly.simulation.physics.cable import Cable, Load
 from e2efly.simulation.physics.state import split
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -121,12 +122,20 @@ class Airframe:
     """Directions of the rotors. None: all push along body z."""
     push: tuple[Array, Array] | None = None
     """Acceleration by a force from outside, world, x and y, m/s^2."""
+    cable: Cable | None = None
+    """The cable of the load that hangs from the vehicle."""
 
     @staticmethod
-    def of(vehicle: Vehicle, dt: float, rotor_share: Array | None = None, push: Array | None = None) -> "Airframe":
+    def of(
+        vehicle: Vehicle,
+        dt: float,
+        rotor_share: Array | None = None,
+        push: Array | None = None,
+        load: Load | None = None,
+    ) -> "Airframe":
         """The plant of a vehicle, any field of which may be batched.
 
-        Sub-steps take `dt` seconds, `rotor_share` is (*n, r), and `push` (*n, 2).
+        Sub-steps take `dt` seconds, `rotor_share` is (*n, r), and `push` (*n, 2). The load hangs from the vehicle.
         """
         v, time, down = vehicle, vehicle.motor_time_constant, vehicle.motor_time_constant_down
         k2, k1, k0 = (v.thrust_map[..., i] for i in range(3))
@@ -164,6 +173,7 @@ class Airframe:
             ceiling=None if v.rotor_speed_ceiling is None else split(v.rotor_speed_ceiling),
             tilt=Tilt.of(v),
             push=None if push is None else (push[..., 0], push[..., 1]),
+            cable=None if load is None else Cable.of(load, v, dt),
         )
 
 

@@ -9,6 +9,7 @@ from jax import Array
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.simulation.physics.airframe import Airframe, Rotors
+from e2efly.simulation.physics.cable import Hanging
 from e2efly.simulation.physics.state import Parts
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
@@ -146,12 +147,16 @@ def rotor_momentum_torque(
 
 
 def accelerations(
-    plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None
+    plant: Airframe,
+    parts: Parts,
+    wind: Vec3 | None,
+    rotor_acceleration: Rotors | None = None,
+    pull: Vec3 | None = None,
 ) -> tuple[Vec3, Vec3]:
     """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
 
     The wind is the velocity of the air in the world, m/s. Accelerations of the rotors, rad/s^2, are required if the
-    plant has rotor inertia.
+    plant has rotor inertia. The pull is that of the cable (`pulled`), world, N.
     """
     thrust, tilt = rotor_thrust(plant, parts.rotor_speed), plant.tilt
     collective, torque = rotor_wrench(plant, thrust)
@@ -174,8 +179,18 @@ def accelerations(
         torque = torque - plant.drag_torque.times(parts.body_rate)
     if (beside := sideways(plant, thrust)) is not None:
         force = Vec3(force.x + beside[0], force.y + beside[1], force.z)
+    if plant.cable is not None and pull is not None:
+        turned = parts.attitude.unrotate(pull)
+        force, torque = force + turned, torque + plant.cable.torque(turned)
     linear = acceleration(plant, parts.attitude, force, collective)
     return linear, angular_acceleration(plant, parts.body_rate, torque)
+
+
+def pulled(plant: Airframe, parts: Parts) -> Vec3 | None:
+    """Force of the cable on the vehicle, world, N. None: no load hangs from it."""
+    if plant.cable is None or parts.load is None:
+        return None
+    return plant.cable.pull(parts.attitude, parts.position, parts.velocity, parts.body_rate, parts.load)
 
 
 def derivative(plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None) -> Parts:
@@ -183,7 +198,11 @@ def derivative(plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_accelerat
 
     The entry of the rotor speeds is zero.
     """
-    linear, angular = accelerations(plant, parts, wind, rotor_acceleration)
+    pull = pulled(plant, parts)
+    linear, angular = accelerations(plant, parts, wind, rotor_acceleration, pull)
+    load = None
+    if plant.cable is not None and parts.load is not None and pull is not None:
+        load = Hanging(parts.load.velocity, plant.cable.falling(pull))
     zero = jnp.zeros_like(linear.z)
     return Parts(
         position=parts.velocity,
@@ -191,6 +210,7 @@ def derivative(plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_accelerat
         attitude=parts.attitude.derivative(parts.body_rate),
         body_rate=angular,
         rotor_speed=(zero,) * len(parts.rotor_speed),
+        load=load,
     )
 
 

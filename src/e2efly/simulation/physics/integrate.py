@@ -10,7 +10,8 @@ from jax import Array
 
 from e2efly.control.vectors import Vec3
 from e2efly.simulation.physics.airframe import Airframe, Rotors
-from e2efly.simulation.physics.body import accelerations, derivative
+from e2efly.simulation.physics.body import accelerations, derivative, pulled
+from e2efly.simulation.physics.cable import Hanging
 from e2efly.simulation.physics.state import Parts
 
 Integrator = Callable[[Airframe, Parts, Rotors, Vec3 | None, float], Parts]
@@ -59,7 +60,12 @@ def semi_implicit(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | N
     """
     speed = lagged(parts.rotor_speed, command, plant.decay, plant.decay_down)
     turning = dataclasses.replace(parts, rotor_speed=speed)
-    linear, angular = accelerations(plant, turning, wind, _mean_change(plant, parts.rotor_speed, speed, dt))
+    pull = pulled(plant, turning)
+    linear, angular = accelerations(plant, turning, wind, _mean_change(plant, parts.rotor_speed, speed, dt), pull)
+    load = parts.load
+    if plant.cable is not None and load is not None and pull is not None:
+        falls = load.velocity + plant.cable.falling(pull) * dt
+        load = Hanging(load.position + falls * dt, falls)
     velocity = parts.velocity + linear * dt
     body_rate = parts.body_rate + angular * dt
     return Parts(
@@ -68,6 +74,7 @@ def semi_implicit(plant: Airframe, parts: Parts, command: Rotors, wind: Vec3 | N
         attitude=(parts.attitude + parts.attitude.derivative(body_rate) * dt).normalized(),
         body_rate=body_rate,
         rotor_speed=speed,
+        load=load,
     )
 
 
@@ -131,3 +138,5 @@ def _finish(parts: Parts, rotor_speed: Rotors) -> Parts:
 
 INTEGRATORS: dict[str, Integrator] = {"euler": euler, "semi_implicit": semi_implicit, "rk3": rk3, "rk4": rk4}
 """Integrators by name."""
+SWINGING = tuple(name for name in INTEGRATORS if name != "euler")
+"""Integrators with which a load may hang from the vehicle: explicit Euler adds energy to its swing."""

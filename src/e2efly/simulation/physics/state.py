@@ -1,6 +1,6 @@
 """The state of a vehicle."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import jax
@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from e2efly.control.vectors import Quat, Vec3, stack
+from e2efly.simulation.physics.cable import Hanging, Load
 from e2efly.vehicles.vehicle import Vehicle
 
 for _kind in (Vec3, Quat):
@@ -57,6 +58,8 @@ class State:
     left."""
     rate_loop: RateLoop | None = None
     """State of the rate loop, if the loop has one. None at the start of a flight."""
+    load: Load | None = None
+    """What hangs from the vehicle on a cable. None: nothing."""
 
     @staticmethod
     def hovering(vehicle: Vehicle, position: Float[Array, "*n 3"]) -> "State":
@@ -82,6 +85,7 @@ class Parts:
     attitude: Quat
     body_rate: Vec3
     rotor_speed: tuple[Array, ...]
+    load: Hanging | None = None
 
     @staticmethod
     def of(state: State) -> "Parts":
@@ -92,16 +96,20 @@ class Parts:
             Quat.of(state.quaternion),
             Vec3.of(state.body_rate),
             split(state.rotor_speed),
+            None if state.load is None else Hanging(Vec3.of(state.load.position), Vec3.of(state.load.velocity)),
         )
 
-    def join(self) -> State:
-        """Join the components into a state."""
+    def join(self, load: Load | None = None) -> State:
+        """Join the components into a state. `load` has what stays of the load that hangs from the vehicle."""
+        if load is not None and self.load is not None:
+            load = replace(load, position=self.load.position.stack(), velocity=self.load.velocity.stack())
         return State(
             self.position.stack(),
             self.velocity.stack(),
             self.attitude.stack(),
             self.body_rate.stack(),
             stack(*self.rotor_speed),
+            load=load,
         )
 
 

@@ -15,7 +15,7 @@ from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import reached
 from e2efly.simulation.physics.control import Command, control_law, remembered
-from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
+from e2efly.simulation.physics.integrate import INTEGRATORS, SWINGING, ahead
 from e2efly.simulation.physics.mixer import Mixer
 from e2efly.simulation.physics.state import Parts, RateLoop, State, split
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
@@ -129,7 +129,7 @@ def step(
         physics: how to integrate and control.
         vehicle: the plant; any field may be batched. Its rate gain, integral gain and filter are those of the rate
             loop. For everything else the flight controller uses `physics.nominal`.
-        state: the state at the start of the step.
+        state: the state at the start of the step. A load that is part of it hangs from the vehicle.
         command: the command, in the units of the command mode.
         previous: the command that still acts before `switch_time`, for latencies that are not a whole number of steps.
         switch_time: time after the start of the step at which `command` replaces `previous`, s, in [0, control_period].
@@ -138,12 +138,17 @@ def step(
         wind: velocity of the air in the world, m/s.
         rotor_share: thrust of each rotor divided by the thrust from the vehicle's thrust map. None: 1.
         push: acceleration by a horizontal force from outside at the centre of mass, world, m/s^2. None: no such force.
+
+    Raises:
+        ValueError: for a load with an integrator that is not stable with it.
     """
+    if state.load is not None and physics.integrator not in SWINGING:
+        raise ValueError(f"integrator is {physics.integrator!r}; accepted with a load: {', '.join(SWINGING)}")
     mode = COMMAND_MODES[physics.command_mode]
     state = started(physics, vehicle, state)
     integrate = INTEGRATORS[physics.integrator]
     dt = physics.control_period / physics.substeps
-    plant = Airframe.of(vehicle, dt, rotor_share, push)
+    plant = Airframe.of(vehicle, dt, rotor_share, push, state.load)
     controller = vehicle_of_loop(physics, vehicle)
     air = None if wind is None else Vec3.of(wind)
     after = split(command)
@@ -168,7 +173,7 @@ def step(
     loop = None if mode.controller is None else state.rate_loop
     start = Parts.of(state), jax.tree.map(Vec3.of, loop)
     (parts, loop), _ = jax.lax.scan(again, start, jnp.arange(physics.substeps))
-    end = parts.join()
+    end = parts.join(state.load)
     if loop is None:
         return dataclasses.replace(end, rate_loop=state.rate_loop)
     return dataclasses.replace(

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -67,7 +68,8 @@ class RaceDuel(RaceDuelGoal):
                 f"{(first - CLEAR - config.position) / (config.agents - 1):.2f} m, so that the places of "
                 f"{config.agents} racers are in front of the first gate, {first:.2f} m from the start"
             )
-        return cls(race.config, shape, race.gates, race.closed, control_period, checks)
+        numbers = dataclasses.replace(config, track="")  # resolved here: tracks share a compiled program
+        return cls(numbers, shape, race.gates, race.closed, control_period, checks)
 
     @property
     def race(self) -> Race:
@@ -122,7 +124,7 @@ class RaceDuel(RaceDuelGoal):
         return self.race.desired_yaw(memory.passed, state)
 
     def advance(
-        self, memory: RaceDuelWorld, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
+        self, memory: Any, before: State, after: State, time: Float[Array, " n"], timed_out: Bool[Array, " n"]
     ) -> tuple[RaceDuelWorld, Outcome]:
         """The world's verdict: it succeeds when all have finished, and nobody had touched anything until then.
 

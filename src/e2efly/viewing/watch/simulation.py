@@ -117,6 +117,8 @@ def _pushed(state: EnvState, push: Push) -> EnvState:
     s = replace(
         s, position=s.position + push.shift, velocity=s.velocity + push.speed, body_rate=s.body_rate + push.rate
     )
+    if s.load is not None:
+        s = replace(s, load=replace(s.load, position=s.load.position + push.shift))
     past = state.past
     if past is not None:
         past = replace(past, position=past.position + push.shift)
@@ -134,6 +136,8 @@ def _advance(
         "body_rate": s.body_rate, "goal": env.task.goal(reached.memory, reached.time), "time": reached.time,
         "command": env.command(action), "done": out.done, "success": out.success,
     }  # fmt: skip
+    if s.load is not None:
+        seen["load"] = s.load.position
     return reached, out.observation, seen
 
 
@@ -221,6 +225,7 @@ class Simulation:
             velocity=seen["velocity"],
             rotor_speed=seen["rotor_speed"],
             goal=seen["goal"] + self._origin,
+            load=seen["load"] + self._origin if "load" in seen else None,
             images=self._images(followed),
             series=self._series(followed, seen),
             fresh=fresh,

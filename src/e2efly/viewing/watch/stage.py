@@ -42,6 +42,8 @@ class StageFrame:
     """Rotor speeds, rad/s: one for each rotor, or one for all of them. Zero if not known."""
     goal: Float[np.ndarray, "n 3"] | None = None
     """Goal positions, m. NaN: no goal."""
+    load: Float[np.ndarray, "n 3"] | None = None
+    """Positions of the loads that hang from the vehicles, m. None: nothing hangs from them."""
     images: dict[str, np.ndarray] = field(default_factory=dict)
     """Images of the followed vehicle's cameras by name, RGB in [0, 1] or grey."""
     series: dict[str, tuple[float, ...]] = field(default_factory=dict)

@@ -39,6 +39,8 @@ TRAIL_POINTS = 120
 """Number of pieces in which the followed vehicle's path is shown, one per frame."""
 MANY = 32
 """With more vehicles than this, only the goal of the followed vehicle is drawn."""
+LOAD = 0.04
+"""Radius of the ball that is drawn for a load, m."""
 FAR_OFF = np.array([[0, 0, 3000], [0, 0, -3000]], np.float32)
 """Positions of two additional instances of each mesh, m. Without them, three.js would not draw a mesh whose first
 positions are out of view."""
@@ -127,6 +129,8 @@ class Viewer:
         self._angle = np.zeros((count, 1))
         self._trail: deque[tuple[np.ndarray, float]] = deque(maxlen=TRAIL_POINTS + 1)
         self._line: Any = None
+        self._load: Any = None
+        self._cable: Any = None
         self._offset, self._placed = np.zeros(3), False
 
     def show(self, stage: Stage, origin: Float[np.ndarray, "3"], frame: StageFrame, elapsed: float) -> None:
@@ -235,6 +239,18 @@ class Viewer:
                 node.visible = known
             if known and frame.goal is not None:
                 node.position = tuple(map(float, frame.goal[row]))
+        if frame.load is not None:
+            self._hang(p[self.followed], np.asarray(frame.load[self.followed] + self._offset, np.float32))
+
+    def _hang(self, vehicle: np.ndarray, load: np.ndarray) -> None:
+        """Draw the followed vehicle's load, and its cable."""
+        cable = np.stack([vehicle, load])[None]
+        if self._load is None:
+            self._load = self._scene.add_icosphere("/vehicles/load", LOAD, color=_rgb(GOAL), subdivisions=2)
+            self._cable = self._scene.add_line_segments(
+                "/vehicles/cable", cable, _rgb(GOAL), thickness=2.0, thickness_units="screen"
+            )
+        self._load.position, self._cable.points = tuple(map(float, load)), cable
 
     def _draw_trail(self, frame: StageFrame) -> None:
         if frame.fresh:

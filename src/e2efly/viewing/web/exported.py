@@ -58,8 +58,8 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
         starts: number of starts.
 
     Raises:
-        ValueError: for a task whose step computes with an operation that the page does not have, and for worlds of
-            several vehicles.
+        ValueError: for a task whose step computes with an operation that the page does not have, for worlds of
+            several vehicles, and for a load.
     """
     if env.agents > 1:
         raise ValueError(f"task.agents is {env.agents}; accepted: a task with one vehicle in a world: a page shows one")
@@ -68,6 +68,8 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
             f"env.command_mode is {env.physics.command_mode!r} with {env.action_size} rotors; accepted: four commands, "
             "as a page flies"
         )
+    if env.payload is not None:
+        raise ValueError(f"env.payload has mass {env.payload.mass}; accepted: 0, 0, as a page shows no load")
     begun = beginnings(env, starts)
     first = _row(begun, 0)
     given = named(first)
