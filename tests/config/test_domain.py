@@ -114,7 +114,7 @@ def test_what_every_task_is_judged_by_and_flies_lies_in_its_training(name: str) 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*/*.onnx")), ids=lambda file: f"{file.parent.name}/{file.stem}")
 def test_every_policy_of_the_zoo_declares_its_training(file: Path) -> None:
     config = from_json(json.loads(config_file(file).read_text()), str(file))
-    assert load_policy(file).contract.courses == config.task.domain()
+    assert load_policy(file).contract.courses == (*config.task.domain(), *config.env.payload.domain())
 
 
 def narrow(path: object) -> str:

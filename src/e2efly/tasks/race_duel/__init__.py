@@ -20,14 +20,7 @@ class RaceDuelConfig(RaceConfig):
     paper: ClassVar[Paper | None] = None
     variants: ClassVar = ()
     asked: ClassVar = {}
-    robust: ClassVar = {
-        "bptt": dataclasses.replace(
-            RaceConfig.robust["bptt"],
-            weights={"progway": 1.0, "fitlog": 4.0, "anglev_sq": 0.001, "act2_sq": 0.01, "apart": 2.0},
-            parameters={"fitlog_margin": 0.1, "apart_reach": 0.4},
-            steps=14_000_000,
-        )
-    }
+    robust: ClassVar = {}
     identified: ClassVar = {}
     family: ClassVar = {}
 
@@ -78,7 +71,7 @@ class RaceDuelConfig(RaceConfig):
         weights = {"progway": 1.0, "fitlog": 4.0, "anglev_sq": 0.001, "act2_sq": 0.01, "apart": 2.0}
         return dataclasses.replace(
             config,
-            algo=BPTTConfig(learning_rate=4e-3, learning_rate_end=1e-4, gradient_decay=0.3, average=0.99),
+            algo=BPTTConfig(learning_rate=4e-3, learning_rate_end=1e-4, gradient_decay=0.3, average=0.99, league=8),
             reward=RewardConfig(weights, {"fitlog_margin": 0.1, "apart_reach": 0.4}),
             network=NetworkConfig((96, 96)),
             steps=10_000_000,
