@@ -172,3 +172,19 @@ def test_who_finishes_first_and_touches_nobody_wins() -> None:
     found = Duels(time, touched, out).as_json()
     assert (found["won"], found["lost"], found["touched"]) == (2 / 6, 2 / 6, 1 / 6)
     assert (found["out"], found["rival_out"], found["seconds"]) == (1 / 6, 1 / 6, 5.25)
+
+
+def test_a_central_critic_knows_all_others_in_the_frame_of_its_vehicle() -> None:
+    reward, asked = RewardConfig({"progway": 1.0}), EnvConfig(central_critic=True)
+    env = Env.of(RaceDuelConfig(agents=3, spacing=0.7, position=0.2), reward, asked)
+    state, _ = env.reset(random_key(0, 0, 0), 3)
+    known = np.asarray(env.privileged(state))
+    assert known.shape == (3, env.privileged_size) == (3, 12)
+    assert environment().privileged_size == 0
+    position, yaw = np.asarray(state.vehicle.position), float(env.task.track.start_yaw)
+    turn = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    np.testing.assert_allclose(
+        known[1, :6], np.concatenate([turn @ (position[i] - position[1]) for i in (0, 2)]), atol=1e-5
+    )
+    with pytest.raises(ValueError, match=r"env.central_critic is True; accepted: False, as a world of race has one"):
+        Env.of(RaceConfig(), reward, asked)

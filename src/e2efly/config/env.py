@@ -285,6 +285,9 @@ class EnvConfig:
     cushion: float = number(0.0, high=3.0, added=True)
     """Additional thrust of a rotor near the ground z = 0, relative to the formula of Cheeseman and Bennett. 0: none
     (sets the program)."""
+    central_critic: bool = shape(False, added=True)
+    """Whether a critic knows the motion of all others of the world, whatever the policy observes of them. Only for
+    tasks with several vehicles in a world (sets shapes)."""
     lost_rotor: float = number(0.0, high=1.0, added=True)
     """Probability that an episode loses a rotor: any one of them stops, and neither the policy nor the flight
     controller is told. 0: none does (sets the program)."""

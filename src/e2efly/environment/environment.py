@@ -31,7 +31,6 @@ from e2efly.config import (
 )
 from e2efly.config.env import FILE, RANDOM, STILL
 from e2efly.control import COMMAND_MODES
-from e2efly.control.vectors import unrotate
 from e2efly.environment import air, disturbance, expert, lost_commands, lost_rotor, payloads, pose_errors
 from e2efly.environment.camera_images import newest
 from e2efly.environment.draws import between, delays, deviations, perturbed
@@ -48,13 +47,13 @@ from e2efly.environment.env_state import (
     where,
 )
 from e2efly.environment.limits import latencies_of, limits_of, posterior_of
+from e2efly.environment.privileged import OTHER_SIZE, SCENE_SIZE, of_others, of_scene
 from e2efly.environment.rules import check
 from e2efly.environment.signals import dangers, happened
 from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
-from e2efly.simulation.scenes import scene as scenes
 from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.simulation.sensors import imu, latency
@@ -66,8 +65,6 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 from e2efly.vehicles.vehicle import Flown
 
-LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
-"""Look-ahead times for which a critic is given the clearance, s."""
 DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
@@ -91,7 +88,7 @@ def _flown_task(config: TaskConfig, shape: Shape, physics: Physics) -> Task:
         "observation_latency_range", "randomize", "posterior", "wind", "downwash", "cushion", "lost_rotor",
         "lost_rotor_time", "disturbance", "estimate", "link", "noise", "payload", "imu", "cameras",
     ],
-    meta_fields=["queue", "seen_actions", "past", "family", "unseen"],
+    meta_fields=["queue", "seen_actions", "past", "family", "central", "unseen"],
 )  # fmt: skip
 @dataclass(frozen=True)
 class Env:
@@ -139,6 +136,8 @@ class Env:
     family: Family | None = None
     """The family, if every episode has a different vehicle, which its flight controller knows. `physics` holds the
     middle one."""
+    central: bool = False
+    """See `EnvConfig.central_critic`."""
     unseen: tuple[str, ...] = ()
     """Names of the vehicle's own fields (`e2efly.policy.observation.OWN`) that are not observed."""
 
@@ -190,6 +189,8 @@ class Env:
             raise ValueError(
                 f"env.downwash is {config.downwash}; accepted: 0, as a world of {task.name} has one vehicle"
             )
+        if config.central_critic and getattr(flown_task, "agents", 1) == 1:
+            raise ValueError(f"env.central_critic is True; accepted: False, as a world of {task.name} has one vehicle")
         return Env(
             physics=physics,
             task=flown_task,
@@ -218,6 +219,7 @@ class Env:
             seen_actions=seen,
             past=latency.frames(oldest, period) + 1 if oldest else 0,
             family=family if flown is None else None,
+            central=config.central_critic,
         )
 
     def on(self, task: TaskConfig) -> "Env":
@@ -376,21 +378,16 @@ class Env:
     @property
     def privileged_size(self) -> int:
         """Number of entries of `privileged`."""
-        return 3 + len(LEADS) if self.cameras else 0
+        return SCENE_SIZE * bool(self.cameras) + OTHER_SIZE * (self.agents - 1) * self.central
 
     def privileged(self, state: EnvState) -> Float[Array, "n p"]:
-        """What a critic may know in addition to the observation, if there are cameras. Empty without cameras.
-
-        It is the vector to the goal in the body frame, and the clearance where the vehicle will be after each of
-        `LEADS` if it flies straight on. Unit m, clipped to a few metres.
+        """What a critic may know in addition to the observation: the true scene if there are cameras, and the motion of
+        all others of the world if the critic is central.
         """
-        n = state.time.shape[0]
-        if not self.cameras:
-            return jnp.zeros((n, 0))
-        s, scene = state.vehicle, self.task.scene(jax.lax.stop_gradient(state.memory))
-        away = unrotate(s.quaternion, self.task.goal(state.memory, state.time) - s.position)
-        ahead = jax.vmap(lambda t: scenes.clearance(scene, s.position + t * s.velocity, state.time + t), out_axes=1)
-        return jnp.concatenate([jnp.clip(away, -5.0, 5.0), jnp.clip(ahead(jnp.asarray(LEADS)), -1.0, 3.0)], axis=-1)
+        parts = [jnp.zeros((state.time.shape[0], 0))]
+        parts += [of_scene(self.task, state)] if self.cameras else []
+        parts += [of_others(state)] if self.central else []
+        return jnp.concatenate(parts, axis=-1)
 
     def _restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
         """Start a new episode where `out` says that the episode ended."""
