@@ -37,11 +37,13 @@ class FormationFlight:
     complete: tuple[bool, ...]
     """Whether each took off, flew the policy for its whole time, landed and was disarmed."""
     error: tuple[float, ...]
-    """Distance of each to its place at the end of the policy's flight, m."""
+    """Distance of each to its place, the first point of its course, at the end of the policy's flight, m."""
     nearest: float
     """Smallest distance between the centres of two vehicles while the policy flew, m."""
     track: np.ndarray
-    """(steps, vehicles, 3) positions while the policy flew, m."""
+    """(steps, vehicles, 3) positions while the policy flew, m. The time between two steps is `step_s`."""
+    step_s: float
+    """s."""
     modes: tuple[str, ...]
     """The modes of each, with the reason for each mode."""
 
@@ -74,10 +76,15 @@ def fly_formation(
     latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
     with ExitStack() as stack:
         rigs = []
-        for i, start in enumerate(starts):
+        courses = [
+            dataclasses.replace(course_for(policy.contract, vehicle, route), start=start)
+            for route, start in zip(routes, starts, strict=True)
+        ]
+        for i, (start, course) in enumerate(zip(starts, courses, strict=True)):
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="e2efly-"))
             rigs.append(stack.enter_context(Rig(firmware, Path(folder), vehicle, latency=latency, seed=seed + i)))
-            rigs[i].state = rigs[i].world.at_rest(start[0], start[1], random.uniform(-np.pi, np.pi))
+            yaw = random.uniform(-np.pi, np.pi) if course.heading is None else course.heading
+            rigs[i].state = rigs[i].world.at_rest(start[0], start[1], yaw)
             rigs[i].sleep(0.5)
 
         def seen(rig: Rig, now: float) -> list[Sample]:
@@ -87,9 +94,8 @@ def fly_formation(
             return [Sample(now, position, np.array(state.quaternion), velocity=np.array(state.velocity))]
 
         sessions = []
-        for rig, route, start in zip(rigs, routes, starts, strict=True):
+        for rig, course, start in zip(rigs, courses, starts, strict=True):
             others = [PlantSource(lambda now, r=other: seen(r, now), "rig") for other in rigs if other is not rig]
-            course = dataclasses.replace(course_for(policy.contract, vehicle, route), start=start)
             session = Session(
                 rig, rehearsal_settings(start[2] - vehicle.feet_height, fence=open_fence(vehicle, REACH)),
                 policy=policy, course=course, hover=hover_controller(HOVER, vehicle, latency + LINK_S),
@@ -118,4 +124,4 @@ def fly_formation(
     pairs = combinations(range(len(rigs)), 2)
     nearest = min(float(np.linalg.norm(positions[:, i] - positions[:, j], axis=-1).min()) for i, j in pairs)
     complete = tuple(bool(a and b and c) for a, b, c in zip(up, flew, landed, strict=True))
-    return FormationFlight(complete, tuple(error), nearest, positions, modes)
+    return FormationFlight(complete, tuple(error), nearest, positions, sessions[0].period, modes)
