@@ -46,8 +46,16 @@ def test_scattered_racers_start_in_front_of_different_gates() -> None:
     axis = np.stack([gates.cos[passed], gates.sin[passed], np.zeros(32)], axis=-1)
     np.testing.assert_allclose(np.sum(before * axis, axis=1), 1.5, atol=0.31)
     assert np.all(passed[::2] != passed[1::2]) and set(passed.tolist()) == set(range(gates.count))
-    (judged,) = RaceDuelConfig(scattered=1.0).criteria().values()
-    assert judged.scattered == 0
+    (judged,) = RaceDuelConfig(scattered=1.0, blind=1.0).criteria().values()
+    assert judged.scattered == 0 == judged.blind
+
+
+def test_a_blind_racer_is_shown_nobody() -> None:
+    env = environment(blind=1.0, laps=0)
+    state, observation = env.reset(random_key(0, 0, 0), 4)
+    np.testing.assert_allclose(observation[:, 6:9], np.broadcast_to([0, 0, FAR], (4, 3)), atol=1e-5)
+    _, some = environment(blind=0.5, laps=0).reset(random_key(0, 0, 0), 64)
+    assert 10 < np.sum(np.asarray(some)[:, 8] > 40) < 54
 
 
 def test_a_racer_sees_the_race_and_the_other() -> None:

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from e2efly.config import RewardConfig
 from e2efly.config.changes import changed
 from e2efly.courses.tracks import load_track
-from e2efly.environment import UNSEEN, Env, random_key
+from e2efly.environment import UNSEEN, Env, EnvState, random_key
 from e2efly.environment.episodes import Act, wilson
 from e2efly.policy.contract import Contract
 from e2efly.policy.observation import PAST_ACTIONS
@@ -120,12 +121,26 @@ def _columns(env: Env, racer: Contract, own: Contract) -> np.ndarray:
     return np.concatenate([there[field.name] for field in racer.observation])
 
 
+def _raced_on(env: Env, state: EnvState, action: Float[Array, "n c"]) -> tuple[EnvState, Float[Array, "n o"]]:
+    """The next state, and what is observed of it. A racer that is out lies on the ground where that happened."""
+    gone = (state.memory.touched | state.memory.out)[:, None]
+    reached, _ = env.step(state, action, restart=False)
+    lying = state.vehicle.position.at[:, 2].set(env.task.shape.feet_height)
+    vehicle = dataclasses.replace(
+        reached.vehicle,
+        position=jnp.where(gone, lying, reached.vehicle.position),
+        velocity=jnp.where(gone, 0.0, reached.vehicle.velocity),
+    )
+    reached = dataclasses.replace(reached, vehicle=vehicle)
+    return reached, env._observe(reached)
+
+
 def _raced(
     env: Env, acts: Sequence[Act], columns: Sequence[np.ndarray], n: int, key: PRNGKeyArray
 ) -> tuple[np.ndarray, ...]:
     """The fields of `Duels` of n racers, whose every a-th is the policy's."""
     options = wide_vectors(n)
-    step = jax.jit(lambda env, state, action: env.step(state, action, restart=False), compiler_options=options)
+    step = jax.jit(_raced_on, compiler_options=options)
     state, observation = jax.jit(lambda env, key: env.reset(key, n), compiler_options=options)(env, key)
     rows = np.arange(n) % env.agents
     whose = [np.flatnonzero(rows == 0), np.flatnonzero(rows > 0)]
@@ -135,8 +150,8 @@ def _raced(
         seen = np.asarray(observation)
         for i, (act, mine, given) in enumerate(zip(acts, whose, columns, strict=True)):
             action[mine], memories[i] = act.act(seen[np.ix_(mine, given)], (), memories[i])
-        state, out = step(env, state, action)
-        observation, race = out.final_observation, state.memory
+        state, observation = step(env, state, action)
+        race = state.memory
         finished, failed = np.asarray(race.finished), np.asarray(race.touched | race.out)
         time = np.where(finished & ~failed & np.isinf(time), np.asarray(state.time), time)
         if np.all(finished | failed):

@@ -36,18 +36,23 @@ class RaceDuelConfig(RaceConfig):
     scattered: float = number(0.0, low=0, high=1)
     """Share of the worlds in which each racer starts in front of a gate of its own, anywhere on the track. A policy
     that has only met itself, one place behind, knows no racer that is far away, or slower."""
+    blind: float = number(0.0, low=0, high=1)
+    """Share of the racers that are shown nobody, for an episode: the others learn to keep away from one that does not
+    keep away from them."""
     collisions_end: bool = True
     """Whether a touch of two racers ends the episode of the whole world. In training it does not, so that the policy
     learns from what follows."""
 
     @classmethod
     def training(cls) -> "RaceDuelConfig":
-        """Lap after lap, in half of the worlds from anywhere, and no touch of two racers ends the episode."""
-        return cls(laps=0, collisions_end=False, scattered=0.5)
+        """Lap after lap, in half of the worlds from anywhere, a quarter of the racers blind, and no touch of two racers
+        ends the episode.
+        """
+        return cls(laps=0, collisions_end=False, scattered=0.5, blind=0.25)
 
     def criteria(self) -> dict[str, TaskConfig]:
         """One lap, or the requested number of laps, for all racers of a world, from the places of start."""
-        judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True, scattered=0.0)
+        judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True, scattered=0.0, blind=0.0)
         return {self.name: judged}
 
     def check(self, control_rate: float, feet_height: float) -> None:

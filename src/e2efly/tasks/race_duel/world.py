@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from e2efly.policy.goal import Outcome, Shape
-from e2efly.policy.others import Others
+from e2efly.policy.others import Others, nobody
 from e2efly.simulation.physics import State
 from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene
@@ -41,6 +41,8 @@ class RaceDuelWorld(RaceDuelMemory):
     """Whether the racer touched another before it had finished."""
     out: Bool[Array, " n"]
     """Whether the racer missed or touched a gate, or left the track, before it had finished."""
+    blind: Bool[Array, " n"]
+    """Whether the racer is shown nobody."""
 
 
 @partial(
@@ -86,7 +88,7 @@ class RaceDuel(RaceDuelGoal):
         scattered, in front of different gates.
         """
         a, c, g = self.agents, self.config, self.track
-        grid_key, key, scatter_key = jax.random.split(key, 3)
+        grid_key, key, scatter_key, blind_key = jax.random.split(key, 4)
         state, passed = self.race.start(key, n)
         keys = jax.random.split(grid_key, n // a)
         order = jax.vmap(lambda k: jax.random.permutation(k, a))(keys).reshape(n)
@@ -106,11 +108,14 @@ class RaceDuel(RaceDuelGoal):
         state = dataclasses.replace(state, position=position, quaternion=from_euler(zero, zero, turned))
         others, bodies = company.nearest(state, a, c.neighbours), company.all_others(state, a)
         no = jnp.zeros(n, bool)
-        return state, RaceDuelWorld(passed, others, bodies, jnp.zeros(n), no, no, no)
+        blind = jax.random.uniform(blind_key, (n,)) < c.blind
+        return state, RaceDuelWorld(passed, others, bodies, jnp.zeros(n), no, no, no, blind)
 
     def observe(self, memory: RaceDuelWorld, time: Float[Array, " n"], state: State) -> Float[Array, "n o"]:
         """The others are seen with the age and the errors with which the vehicle sees itself."""
-        others = company.nearest(state, self.agents, self.config.neighbours)
+        near, away = company.nearest(state, self.agents, self.config.neighbours), memory.blind[:, None, None]
+        none = nobody(state.position, self.config.neighbours)
+        others = Others(jnp.where(away, none.position, near.position), jnp.where(away, none.velocity, near.velocity))
         return super().observe(self.among(memory, others), time, state)
 
     def scene(self, memory: RaceDuelWorld) -> Scene:
@@ -139,7 +144,7 @@ class RaceDuel(RaceDuelGoal):
         done, clean = company.all_of_world(finished, a), ~company.any_of_world(touched | out, a)
         ends = company.any_of_world(left | (hit & (self.config.collisions_end > 0)), a) | done
         bodies = company.all_others(jax.lax.stop_gradient(after), a)
-        moved = RaceDuelWorld(passed, memory.others, bodies, time, finished, touched, out)
+        moved = RaceDuelWorld(passed, memory.others, bodies, time, finished, touched, out, memory.blind)
         signals = one.signals | {"misses": company.misses(after, a, reach)}
         return moved, dataclasses.replace(
             one, terminated=ends, success=done & clean, crashed=left | hit, signals=signals
