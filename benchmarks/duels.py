@@ -2,13 +2,13 @@
 
     python benchmarks/duels.py --policies race runs/race_duel-bptt-0 runs/another [--races 500] [--seed 3000000]
 
-Each policy races against each other, from starts of a seed that no training draws. The first policy is the one that
-was trained alone. Only a policy of `race_duel` observes others, so at least one of each pair must be of that task. A
-rating is that of Bradley and Terry on Elo's scale, of 0 on average, where a race that nobody wins counts half for both;
-its 95 % interval is by 500 draws of the same number of races.
+Each policy races against each other, and policies that see no others against themselves, too, from starts of a seed
+that no training draws. A rating is that of Bradley and Terry on Elo's scale, of 0 on average, where a race that nobody
+wins counts half for both; its 95 % interval is by 500 draws of the same number of races.
 """
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from common import arguments, table, write
@@ -44,21 +44,19 @@ def main() -> None:
     """Race all pairs, rate them, print, write JSON."""
     args = arguments(__doc__ or "", policies=[""], races=500, seed=3_000_000)
     names, rows, results = list(args.policies), [], dict[tuple[int, int], np.ndarray]()
-    sees = [bool(candidate(name).policy.contract.neighbours) for name in names]
-    for i, j in combinations(range(len(names)), 2):
-        first, second = (i, j) if sees[i] else (j, i)
-        if not sees[first]:
-            continue
-        found: Duels = duel(names[first], names[second], args.races, seed=args.seed)
-        results[first, second] = np.where(found.won, 1.0, np.where(found.lost, 0.0, 0.5))
-        rows.append({"policy": names[first], "rival": names[second]} | found.as_json())
+    blind = [i for i, name in enumerate(names) if not candidate(name).policy.contract.neighbours]
+    for i, j in [*combinations(range(len(names)), 2), *((i, i) for i in blind)]:
+        found: Duels = duel(names[i], names[j], args.races, seed=args.seed)
+        if i != j:
+            results[i, j] = np.where(found.won, 1.0, np.where(found.lost, 0.0, 0.5))
+        rows.append({"policy": Path(names[i]).name, "rival": Path(names[j]).name} | found.as_json())
         print(rows[-1], flush=True)
     rng = np.random.default_rng(0)
     best = ratings(drawn_points(results, len(names), None))
     spread = np.array([ratings(drawn_points(results, len(names), rng)) for _ in range(DRAWS)])
     low, high = np.percentile(spread, [2.5, 97.5], axis=0)
     elo = [
-        {"policy": name, "Elo": round(float(b)), "95 %": f"{a:.0f} to {c:.0f}"}
+        {"policy": Path(name).name, "Elo": round(float(b)), "95 %": f"{a:.0f} to {c:.0f}"}
         for name, b, a, c in zip(names, best, low, high, strict=True)
     ]
     print(table(rows), table(elo), sep="\n\n")

@@ -59,5 +59,5 @@ def test_two_policies_race(policy_of: Callable[..., Path]) -> None:
     np.testing.assert_array_equal(there.out, alike.out)  # the hand-made controller reads neither
     with pytest.raises(ValueError, match=r"--rival observes position_error \(3\); accepted: gates \(6\), others"):
         duel(policy, str(policy_of("hover")), 4)
-    with pytest.raises(ValueError, match=r"--rival is given for a policy of hover; accepted: a policy of race_duel"):
+    with pytest.raises(ValueError, match=r"--rival is given for a policy of hover; accepted: a policy of race_"):
         duel(str(policy_of("hover")), policy, 4)

@@ -49,8 +49,7 @@ class Eval:
     """The vehicle for which the flight controller is tuned. policy: the policy's own vehicle, whatever flies. plant:
     the vehicle that flies."""
     rival: Path | None = None
-    """Race against another policy, from unseen starts: for a policy of race_duel. A policy of race, which sees no
-    others, can be the rival."""
+    """Race against another policy, from unseen starts: for policies of race_duel, and of race, which see no others."""
     stress: bool = False
     """Test robustness, row by row, with vehicles, air and sensors that differ from the training. See
     docs/robustness.md."""

@@ -18,6 +18,8 @@ from e2efly.environment.episodes import Act, wilson
 from e2efly.policy.contract import Contract
 from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.simulation.device import wide_vectors
+from e2efly.tasks.race import RaceConfig
+from e2efly.tasks.race_duel import RaceDuelConfig
 from e2efly.validation.evaluation import SEED, act_of, candidate
 
 LAPS = 3
@@ -73,11 +75,12 @@ class Duels:
 def duel(
     policy: str, rival: str, races: int = 500, *, task: Mapping[str, Any] | None = None, seed: int = SEED
 ) -> Duels:
-    """Fly a policy of `race_duel` against another, from unseen starts. One racer of each world is the policy's.
+    """Race policies of `race_duel` and of `race`, which see no others, from unseen starts. One racer of each world is
+    the policy's, the others are the rival's.
 
     Args:
         policy: a run directory, a policy.onnx, or a task of the zoo.
-        rival: the same, of any task whose fields `race_duel` observes, too: a policy of `race` sees no others.
+        rival: the same.
         races: number of races.
         task: options of the policy's task by dotted name. By default a closed track has `LAPS` laps.
         seed: the seed of the starts.
@@ -86,10 +89,12 @@ def duel(
         ValueError: for a policy of another task, and for a rival that observes or commands something else.
     """
     found = candidate(policy)
-    if not hasattr(found.task, "agents") or not hasattr(found.task, "laps"):
-        raise ValueError(f"--rival is given for a policy of {found.task.name}; accepted: a policy of race_duel")
+    own = found.task
+    if not isinstance(own, RaceConfig):
+        raise ValueError(f"--rival is given for a policy of {own.name}; accepted: a policy of race_duel or race")
+    own = own if isinstance(own, RaceDuelConfig) else RaceDuelConfig(track=own.track)
     other = candidate(rival)
-    asked: Any = changed(found.task, task or {}, "task")
+    asked: Any = changed(own, task or {}, "task")
     laps = LAPS if load_track(asked.track).closed else 1
     flown = changed(asked, {"laps": laps, "episode_s": LONGEST} | dict(task or {}), "task")
     (suite,) = flown.criteria().values()
