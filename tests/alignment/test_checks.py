@@ -188,3 +188,16 @@ def test_a_voltage_that_was_not_measured_scales_no_motor_outputs(vehicle: Vehicl
     assert dead.notes == ("the battery's voltage was not measured: 0 V",)
     assert late.streams["voltage"].values.min() == 16.1
     assert late.notes == ("3 voltages of 0 V are left out",)
+
+
+def test_axes_that_hardly_move_are_told(vehicle: Vehicle) -> None:
+    record = flight()
+    time, rng = record.streams["position"].time, np.random.default_rng(1)
+    up, still = np.array([0.0, 0.0, 1.0]), rng.normal(0, 1e-4, (len(time), 3))
+    climbs = {
+        "position": Stream(time, still + (1.5 + 0.5 * np.sin(time))[:, None] * up),
+        "velocity": Stream(time, still + (0.5 * np.cos(time))[:, None] * up),
+    }
+    streams = {name: stream for name, stream in record.streams.items() if name != "specific_force"}
+    (found,) = checked([replace(record, streams=streams | climbs)], vehicle)
+    assert any("velocity can be checked against the change of position on 1 of 3 axes" in note for note in found.notes)

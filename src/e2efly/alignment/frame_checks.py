@@ -204,6 +204,11 @@ def in_one_frame(record: Record, part: Record) -> Record:
         for name, (one, other, *needed) in TOLD.items()
         if needed and record.has(*needed) and name not in usual
     ]
+    blind += [
+        f"{one} can be checked against {other} on {usual[name].axes} of 3 axes: there is too little motion on the rest"
+        for name, (one, other, *needed) in TOLD.items()
+        if needed and name in usual and usual[name].axes < 3
+    ]
     record = replace(record, notes=(*record.notes, *blind))
     if best is None and not wrong:
         return record
