@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from e2efly.commands.cli import run
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import trace
 from e2efly.policy.others import FAR
@@ -61,3 +62,13 @@ def test_two_policies_race(policy_of: Callable[..., Path]) -> None:
         duel(policy, str(policy_of("hover")), 4)
     with pytest.raises(ValueError, match=r"--rival is given for a policy of hover; accepted: a policy of race_"):
         duel(str(policy_of("hover")), policy, 4)
+
+
+def test_what_a_race_between_policies_does_not_use_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["eval", "race_duel", "--rival", "race", "--controller", "plant", "--env.wind", "3"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert (
+        "--env, --controller is given with --rival; accepted: --task, --episodes, --seed, --device and --json" in told
+    )
+    assert run(["eval", "race_duel", "--rival", "race", "--episodes", "0"]) == 2
+    assert "--episodes is 0; accepted: more than 0" in capsys.readouterr().err

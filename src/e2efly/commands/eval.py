@@ -100,10 +100,10 @@ def run(asked: Asked) -> int:
     """
     options = asked.options
     check_stress(options.stress, options.rows, options.least)
-    if options.stress:
-        return _stress(options)
     if options.rival is not None:
         return _duel(options, options.rival, asked)
+    if options.stress:
+        return _stress(options)
     from e2efly.validation.evaluation import ROW, evaluate
     from e2efly.viewing.evaluation_plots import plot_evaluation
 
@@ -131,11 +131,16 @@ def _stress(o: Eval) -> int:
 def _duel(o: Eval, rival: Path, asked: Asked) -> int:
     from e2efly.validation.duels import duel
 
-    only = {"--vehicle": o.vehicle, "--baseline": o.baseline, "--env": asked.env or None, "--plots": o.plots}
-    if wrong := [name for name, value in only.items() if value is not None]:
-        raise ValueError(f"{', '.join(wrong)} is given with --rival; accepted: --task, --episodes, --seed and --json")
+    other = {
+        "--vehicle": o.vehicle, "--baseline": o.baseline, "--env": asked.env, "--plots": o.plots,
+        "--controller": o.controller != "policy", "--stress": o.stress,
+    }  # fmt: skip
+    if wrong := [name for name, value in other.items() if value]:
+        raise ValueError(
+            f"{', '.join(wrong)} is given with --rival; accepted: --task, --episodes, --seed, --device and --json"
+        )
     console = Terminal()
-    found = duel(str(o.policy), str(rival), o.episodes, task=asked.task, seed=o.seed).as_json()
+    found = duel(str(o.policy), str(rival), o.episodes, task=asked.task, seed=o.seed, device=o.device).as_json()
     table = headed(f"of {o.episodes} races", "policy", "rival")
     table.add_row("won", f"{found['won']:.1%}", f"{found['lost']:.1%}")
     table.add_row("95 % interval", "{:.1%} to {:.1%}".format(*found["won_interval_95"]), "")

@@ -17,7 +17,7 @@ from e2efly.environment import UNSEEN, Env, EnvState, random_key
 from e2efly.environment.episodes import Act, wilson
 from e2efly.policy.contract import Contract
 from e2efly.policy.observation import PAST_ACTIONS
-from e2efly.simulation.device import wide_vectors
+from e2efly.simulation.device import prepare, wide_vectors
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race_duel import RaceDuelConfig
 from e2efly.validation.evaluation import SEED, act_of, candidate
@@ -73,7 +73,13 @@ class Duels:
 
 
 def duel(
-    policy: str, rival: str, races: int = 500, *, task: Mapping[str, Any] | None = None, seed: int = SEED
+    policy: str,
+    rival: str,
+    races: int = 500,
+    *,
+    task: Mapping[str, Any] | None = None,
+    seed: int = SEED,
+    device: str | None = None,
 ) -> Duels:
     """Race policies of `race_duel` and of `race`, which see no others, from unseen starts. One racer of each world is
     the policy's, the others are the rival's.
@@ -84,10 +90,15 @@ def duel(
         races: number of races.
         task: options of the policy's task by dotted name. By default a closed track has `LAPS` laps.
         seed: the seed of the starts.
+        device: cpu or gpu.
 
     Raises:
-        ValueError: for a policy of another task, and for a rival that observes or commands something else.
+        ValueError: for no races, for a policy of another task, and for a rival that observes or commands something
+            else.
     """
+    if races <= 0:
+        raise ValueError(f"--episodes is {races}; accepted: more than 0")
+    prepare(device)
     found = candidate(policy)
     own = found.task
     if not isinstance(own, RaceConfig):
