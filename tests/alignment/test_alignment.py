@@ -128,6 +128,8 @@ def test_logs_that_cannot_be_aligned_are_refused_and_nothing_is_written(
 
     mute = {name: stream for name, stream in record.streams.items() if name != "command"}
     assert "accepted: command in every flight, besides body_rate" in refusal(mute)
+    assert run(["align", f"{tmp_path / 'log.csv'}:5-2", "--out", str(tmp_path / "out")]) == 2
+    assert "is from 5 to 2 s" in " ".join(capsys.readouterr().err.split())
     assert "--pose-delay is -1.0; accepted: 0 to 1 s" in refusal(dict(record.streams), "--pose-delay", "-1")
     calm = refusal(dict(flown(FILE, 6.0, Sensors(pose_delay=0.0), speed=0.0, pulses=False).streams))
     for name in ("rate_gain of roll", "rate_gain of pitch", "rate_gain of yaw", "the delay"):

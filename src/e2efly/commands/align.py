@@ -35,7 +35,8 @@ class Align:
 
     logs: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE [FILE ...]")]]
     """Logs with commands (thrust over mass and body rates) and body rates: our .mcap, CSV, or a Betaflight blackbox
-    log. A blackbox beside our .mcap of the same flight is laid over it."""
+    log. A blackbox beside our .mcap of the same flight is laid over it. LOG:BEGIN-END selects the part between two
+    times, in s from the beginning of the log."""
     vehicle: str = "vis_r"
     """The vehicle to align: a name or a .toml file. Everything except delay, rate loop and motor lag stays as it
     is."""
@@ -62,7 +63,7 @@ def run(options: Align) -> int:
     from e2efly.alignment.identification import driver_of
     from e2efly.alignment.vehicle_file import merged, write_vehicle
     from e2efly.logs.blackbox_merge import with_blackboxes
-    from e2efly.logs.readers import read_flights
+    from e2efly.logs.readers import read_part
     from e2efly.simulation.device import prepare
     from e2efly.viewing.alignment_plots import plot_alignment
     from e2efly.viewing.closed_loop_plot import plot_closed_loop
@@ -74,7 +75,7 @@ def run(options: Align) -> int:
         raise ValueError(f"--pose-delay is {options.pose_delay}; accepted: 0 to 1 s")
     vehicle, reading = load_vehicle(options.vehicle), options.read.reading()
     check_quadrotor(vehicle, "align")
-    read = with_blackboxes([record for path in options.logs for record in read_flights(path, reading)])
+    read = with_blackboxes([record for path in options.logs for record in read_part(path, reading)])
     show_notes(read, console)
     driver_of(read, step=True)
     records = checked(read, vehicle)
