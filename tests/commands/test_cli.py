@@ -38,8 +38,14 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["play"], "unknown command 'play'; did you mean 'watch'?"),
         (["fyl"], "unknown command 'fyl' (there are: ablate,"),  # never one that moves a real vehicle
         (["list", "reward"], "unknown catalogue 'reward'; did you mean 'rewards'?"),
-        (["train", "hover", "lr=1e-3"], "unknown option 'lr=1e-3'; did you mean --algo.learning-rate?"),
-        (["train", "hover", "--lr", "1e-3"], "unknown option '--lr'; did you mean --algo.learning-rate?"),
+        (
+            ["train", "hover", "lr=1e-3"],
+            "unknown option 'lr=1e-3'; did you mean --env.lost-rotor or --algo.learning-rate?",
+        ),
+        (
+            ["train", "hover", "--lr", "1e-3"],
+            "unknown option '--lr'; did you mean --env.lost-rotor or --algo.learning-rate?",
+        ),
         (["train", "hover", "--gpu"], "unknown option '--gpu'; did you mean --device gpu?"),
         (["train", "race", "--task.lap=2"], "unknown option '--task.lap=2'; did you mean --task.laps"),
         (["eval", "--episode", "5"], "unknown option '--episode'; did you mean --episodes or"),  # and no policy
