@@ -38,6 +38,8 @@ GYROSCOPE = Field("gyroscope", 3, "body", "rad/s", 4.0, "measured angular veloci
 ACCELEROMETER = Field("accelerometer", 3, "body", "m/s^2", 10.0, "measured specific force (level at rest: 0, 0, 9.81)")
 
 
+OTHERS = "others"
+"""Name of the field with the positions of other vehicles."""
 PAST_ACTIONS = "past_actions"
 """Name of the field with the policy's own last outputs."""
 

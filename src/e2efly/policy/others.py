@@ -8,10 +8,8 @@ from typing import Any
 
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
-from e2efly.policy.observation import Field
+from e2efly.policy.observation import OTHERS, Field
 
-OTHERS = "others"
-"""Name of the field of the positions."""
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
 
