@@ -17,10 +17,10 @@ from e2efly.policy.zoo import policy_file
 from e2efly.tasks.route import course_for, route_of
 from e2efly.validation.closed_loop import closed_loop, policy_of
 from e2efly.validation.plant import RigidState
-from e2efly.validation.plant_flight import fly
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.closed_loop_plot import plot_closed_loop
+from tests.validation.alone import fly
 
 FILE = load_vehicle("vis_r")
 POLICY = policy_file("hover", "vis_r")

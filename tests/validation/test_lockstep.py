@@ -49,6 +49,8 @@ def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[...,
 def test_worlds_of_several_are_refused_where_one_flies_alone(policy_of: Callable[..., Path]) -> None:
     with pytest.raises(ValueError, match=r"task.agents is 8; accepted for --stress: a task with one vehicle"):
         stress(policy_of("swap"), "simulator", 1)
+    with pytest.raises(ValueError, match=r"--plant is 'betaflight' and task.agents 8; accepted: .*'mujoco'.*at once"):
+        validate(policy_of("swap"), "betaflight", 8)
 
 
 def test_two_policies_race(policy_of: Callable[..., Path]) -> None:

@@ -26,11 +26,11 @@ from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.goal import TrackGoal, TrackMemory
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import RigidState
-from e2efly.validation.plant_flight import fly
 from e2efly.validation.plants.mujoco import MujocoPlant
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.validation.reality import Reality
 from e2efly.vehicles.loading import load_vehicle
+from tests.validation.alone import fly
 
 START = RigidState(np.array([0.5, -0.5, 3.2]), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3))
 SHAPE, PERIOD = Shape(0.05, 0.12), 1 / 30

@@ -18,11 +18,12 @@ from e2efly.tasks import TASKS
 from e2efly.validation.evaluation import BATCH as EVAL_BATCH
 from e2efly.validation.evaluation import act_of
 from e2efly.validation.plant import RigidState
-from e2efly.validation.plant_flight import Trajectory, fly
+from e2efly.validation.plant_flight import Trajectory
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.validation.starts import BATCH, Starts, draw_starts
 from e2efly.validation.task_verdict import judge
 from e2efly.vehicles.loading import load_vehicle
+from tests.validation.alone import fly
 
 N = 4
 SEED = 1_000_000

@@ -185,12 +185,12 @@ class Env:
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         flown_task = _flown_task(task, shape, physics)
-        if config.downwash and getattr(flown_task, "agents", 1) == 1:
-            raise ValueError(
-                f"env.downwash is {config.downwash}; accepted: 0, as a world of {task.name} has one vehicle"
-            )
-        if config.central_critic and getattr(flown_task, "agents", 1) == 1:
-            raise ValueError(f"env.central_critic is True; accepted: False, as a world of {task.name} has one vehicle")
+        if getattr(flown_task, "agents", 1) == 1:
+            for name, off in (("downwash", 0), ("central_critic", False)):
+                if value := getattr(config, name):
+                    raise ValueError(
+                        f"env.{name} is {value}; accepted: {off}, as a world of {task.name} has one vehicle"
+                    )
         return Env(
             physics=physics,
             task=flown_task,
@@ -386,7 +386,7 @@ class Env:
         """
         parts = [jnp.zeros((state.time.shape[0], 0))]
         parts += [of_scene(self.task, state)] if self.cameras else []
-        parts += [of_others(state)] if self.central else []
+        parts += [of_others(state.vehicle, self.agents)] if self.central else []
         return jnp.concatenate(parts, axis=-1)
 
     def _restart(self, state: EnvState, out: Step) -> tuple[EnvState, Step]:
@@ -495,7 +495,7 @@ class Env:
             plant["rotor_position"] = rotors - disturbance.level(offset, rotors)
         lost = None
         if self.lost_rotor is not None and self.lost_rotor_time is not None:
-            lost_key = jax.random.fold_in(plant_key, 4)
+            lost_key = jax.random.fold_in(plant_key, 5)
             lost = lost_rotor.draw(self.lost_rotor, self.lost_rotor_time, lost_key, n, flown.rotor_count)
         dtype = self.center.dtype
         vehicle, memory = self.task.start(task_key, n)

@@ -1,14 +1,14 @@
 """What only a critic knows: the true scene, and all others of a world. No policy is given it."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from e2efly.control.vectors import unrotate
 from e2efly.environment.env_state import EnvState
+from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import clearance
+from e2efly.tasks.company import all_others
 from e2efly.tasks.task import Task
 
 LEADS = (0.0, 0.25, 0.5, 1.0, 1.5)
@@ -32,14 +32,13 @@ def of_scene(task: Task, state: EnvState) -> Float[Array, "n p"]:
     return jnp.concatenate([jnp.clip(away, -WIDEST, WIDEST), near], axis=-1)
 
 
-def of_others(state: EnvState) -> Float[Array, "n p"]:
-    """Positions and velocities of all others of the world minus the vehicle's, in the body frame, m and m/s, clipped.
-
-    The task's state has them as `bodies` (`company.all_others`).
+def of_others(vehicle: State, agents: int) -> Float[Array, "n p"]:
+    """Positions and velocities of all others of the world minus the vehicle's, in the body frame, m and m/s,
+    clipped.
     """
-    others: Any = state.memory.bodies
+    others = all_others(vehicle, agents)
     n, count, _ = others.position.shape
-    pairs = others.position - state.vehicle.position[:, None], others.velocity - state.vehicle.velocity[:, None]
-    turn = jnp.repeat(state.vehicle.quaternion[:, None], count, axis=1)
+    turn = jnp.repeat(vehicle.quaternion[:, None], count, axis=1)
+    pairs = others.position - vehicle.position[:, None], others.velocity - vehicle.velocity[:, None]
     seen = [jnp.clip(unrotate(turn, pair), -WIDEST, WIDEST).reshape(n, -1) for pair in pairs]
     return jnp.concatenate(seen, axis=-1)

@@ -67,10 +67,10 @@ class BPTT(Algorithm):
     ) -> tuple[TrainState, dict[str, Array]]:
         """One window and one gradient step."""
         old, rate, key = state.parameters, annealed(config, progress), state.key
-        newest, rival = seat(progress, max(config.league, 1)), None
+        rival = None
         if old.league is not None:
             drawn, key = jax.random.split(key)
-            rival = opponent(old.league, drawn, newest)
+            rival = opponent(old.league, drawn, seat(progress, config.league))
 
         def gain(learner: Weights) -> tuple[dict[str, Array], Any]:
             return self._window(env, config, learner, rival, state, progress)
@@ -83,7 +83,7 @@ class BPTT(Algorithm):
             share = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
             policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         metrics |= {"loss/gradient_norm": norm, **norms}
-        members = None if old.league is None else joined(old.league, learner, newest)
+        members = None if old.league is None else joined(old.league, learner, seat(progress, config.league))
         parameters = BPTTParameters(policy, learner, members)
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
 

@@ -125,7 +125,8 @@ def _columns(env: Env, racer: Contract, own: Contract) -> np.ndarray:
     """The entries of the observation that a racer observes, in its order."""
     ends = np.cumsum([field.size for field in env.fields])
     there = {field.name: np.arange(end - field.size, end) for field, end in zip(env.fields, ends, strict=True)}
-    there[PAST_ACTIONS] = there.get(PAST_ACTIONS, np.arange(0))[: 4 * racer.past_actions]  # the newest are the first
+    kept = racer.action.size * racer.past_actions
+    there[PAST_ACTIONS] = there.get(PAST_ACTIONS, np.arange(0))[:kept]  # the newest are the first
     if wrong := [f"{f.name} ({f.size})" for f in racer.observation if len(there.get(f.name, ())) != f.size]:
         offered = ", ".join(f"{f.name} ({f.size})" for f in env.fields)
         raise ValueError(f"--rival observes {', '.join(wrong)}; accepted: {offered}")

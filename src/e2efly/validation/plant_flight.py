@@ -72,40 +72,6 @@ Flying = Generator[RigidState, Sequence[RigidState], Trajectory]
 """A flight, step by step."""
 
 
-def fly(
-    runtime: Runtime,
-    plant: Plant,
-    start: RigidState,
-    duration: float,
-    latency: float,
-    air: Air | None = None,
-    sample: float | None = None,
-    images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
-    law: LawStep | None = None,
-) -> Trajectory:
-    """Fly from one start until the time is over, or the task is done or has failed.
-
-    Args:
-        runtime: policy, contract and course.
-        plant: the plant to fly.
-        start: the state at the start.
-        duration: longest flight, s, in whole control periods.
-        latency: time from observation to command, s.
-        air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
-        sample: longest time between two samples, s. None: no samples are kept.
-        images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
-        law: the control steps of the flight under a law of the stress.
-
-    Returns:
-        The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
-
-    Raises:
-        ValueError: for a start, duration or latency that cannot be flown.
-    """
-    (flown,) = together([flying(runtime, plant, start, duration, latency, air, sample, images, law)])
-    return flown
-
-
 def together(flights: Sequence[Flying]) -> list[Trajectory]:
     """Fly several vehicles of a world in lockstep, each on its own plant: they see each other, and do not touch.
 
@@ -136,8 +102,27 @@ def flying(
     images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
     law: LawStep | None = None,
 ) -> Flying:
-    """The flight of `fly`, which gives its state before each control step, and is sent those of all others. Among
-    others it goes on when its task is done, as it is in their way.
+    """Fly from one start until the time is over, or the task is done or has failed.
+
+    It gives its state before each control step, and is sent those of all others (`together`). Among others it goes on
+    when its task is done, as it is in their way.
+
+    Args:
+        runtime: policy, contract and course.
+        plant: the plant to fly.
+        start: the state at the start.
+        duration: longest flight, s, in whole control periods.
+        latency: time from observation to command, s.
+        air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
+        sample: longest time between two samples, s. None: no samples are kept.
+        images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
+        law: the control steps of the flight under a law of the stress.
+
+    Returns:
+        The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
+
+    Raises:
+        ValueError: for a start, duration or latency that cannot be flown.
     """
     contract = runtime.policy.contract
     period = 1 / contract.control_rate_hz

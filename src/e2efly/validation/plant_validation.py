@@ -193,6 +193,11 @@ def validate(
     kept = ROW + KEPT * int(longest * found.policy.contract.control_rate_hz)
     kept += 0 if log is None else 4 * KEPT * int(longest / SAMPLE)
     agents = max(found.environment(suite).agents for suite in suites.values())
+    if agents > 1 and not kind.parallel:
+        able = ", ".join(repr(name) for name, plant in PLANTS.items() if plant.parallel)
+        raise ValueError(
+            f"--plant is {kind.name!r} and task.agents {agents}; accepted: {able}, several of which can run at once"
+        )
     episodes = -(-episodes // agents) * agents  # whole worlds
     trained, _, _ = fly_criteria(found.at_home, episodes, seed, kept)
     criteria = {}

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -109,16 +110,7 @@ def test_an_inertial_frame_that_is_not_the_bodys(vis_r: Vehicle, random_state: C
     )
     vehicle = dataclasses.replace(vehicle, drag_linear=20 * vehicle.drag_linear)  # strong, to be seen
     start = random_state(8)
-    turn = Rotation.from_quat(np.array(start.quaternion), scalar_first=True)
-    data.qpos[:3] = start.position - turn.apply(away)
-    data.qpos[3:] = start.quaternion
-    data.qvel[:3] = start.velocity - turn.apply(np.cross(start.body_rate, away))
-    data.qvel[3:] = start.body_rate
-    for _ in range(2000):
-        mujoco.mj_step(model, data)
-    speed = rotor_speed_for(vehicle, split(jnp.asarray(thrust)))
-    end = flown(vehicle, dataclasses.replace(start, rotor_speed=jnp.stack(speed)), 2000)
-    turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
+    end, turn = both_flown(model, data, vehicle, start, away, thrust)
     np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
     np.testing.assert_allclose(end.velocity, data.qvel[:3] + turn.apply(np.cross(data.qvel[3:], away)), atol=1e-6)
     np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
@@ -139,7 +131,21 @@ def test_a_payload_that_is_fixed(vacuum: Vehicle, random_state: Callable[..., St
         f"<actuator>{actuators}</actuator>",
     )
     vehicle, start = with_payload(vacuum, mass, place), random_state(9)
-    away, turn = vehicle.centre_of_mass, Rotation.from_quat(np.array(start.quaternion), scalar_first=True)
+    away = vehicle.centre_of_mass
+    end, turn = both_flown(model, data, vehicle, start, away, thrust)
+    np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
+    np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
+
+
+def both_flown(
+    model: Any, data: Any, vehicle: Vehicle, start: State, away: np.ndarray, thrust: np.ndarray
+) -> tuple[State, Rotation]:
+    """Fly 2000 steps in MuJoCo, whose body's origin is `away` from the centre of mass, and in our physics.
+
+    Returns:
+        Our state at the end, and MuJoCo's attitude. Its other figures are in `data`.
+    """
+    turn = Rotation.from_quat(np.array(start.quaternion), scalar_first=True)
     data.qpos[:3] = start.position - turn.apply(away)
     data.qpos[3:] = start.quaternion
     data.qvel[:3] = start.velocity - turn.apply(np.cross(start.body_rate, away))
@@ -148,9 +154,7 @@ def test_a_payload_that_is_fixed(vacuum: Vehicle, random_state: Callable[..., St
         mujoco.mj_step(model, data)
     speed = rotor_speed_for(vehicle, split(jnp.asarray(thrust)))
     end = flown(vehicle, dataclasses.replace(start, rotor_speed=jnp.stack(speed)), 2000)
-    turn = Rotation.from_quat(data.qpos[3:], scalar_first=True)
-    np.testing.assert_allclose(end.position, data.qpos[:3] + turn.apply(away), atol=1e-7)
-    np.testing.assert_allclose(end.body_rate, data.qvel[3:], atol=1e-6)
+    return end, Rotation.from_quat(data.qpos[3:], scalar_first=True)
 
 
 def flown(vehicle: Vehicle, start: State, steps: int) -> State:
