@@ -24,7 +24,7 @@ from tests.validation.speeds import SpeedLink
 
 from e2efly.control import Ctbr, Vec3
 from e2efly.control.place import Place
-from e2efly.flight.betaflight.link import open_link
+from e2efly.flight.link import open_link
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
 from e2efly.validation import firmware_program

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
-from e2efly.flight.betaflight.link import StreamLink
 from e2efly.flight.betaflight.messages import SET_RAW_RC
+from e2efly.flight.link import StreamLink
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.sight import image_source as sight
 from e2efly.policy.odometry import Sample

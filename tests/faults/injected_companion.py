@@ -64,7 +64,7 @@ def _asks(stage: Stage, data: bytes) -> bytes:
 
 def _waits(stage: Stage, data: bytes) -> bytes:
     """The sticks of a bridge that waits on the ground, with the throttle closed."""
-    held = stage.session.bridge.sticks
+    held = stage.session.autopilot.sticks
     channels = held.arrange((*(held.centre + offset for offset in PROBE), CLOSED), ())
     return encode(set_raw_rc(channels)) if sticks(data) else b""
 

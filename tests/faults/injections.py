@@ -65,7 +65,7 @@ def _failsafe(stage: Stage) -> Injection:
     """The controller says that its receiver has failed, and goes on by the companion's sticks."""
 
     def failed(payload: bytes) -> bytes:
-        bit = 1 << stage.session.info.box_ids.index(FAILSAFE)
+        bit = 1 << stage.session.autopilot.info.box_ids.index(FAILSAFE)
         flags = int.from_bytes(payload[FLAGS : FLAGS + 4], "little") | bit
         return payload[:FLAGS] + flags.to_bytes(4, "little") + payload[FLAGS + 4 :]
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.betaflight.link import open_link
-from e2efly.flight.betaflight.row import problems
-from e2efly.flight.betaflight.settings_check import examine
-from e2efly.flight.flight_loop import PLAN_PERIOD, plan_of
+from e2efly.flight.betaflight.descent_plan import plan_of
+from e2efly.flight.flight_loop import PLAN_PERIOD
+from e2efly.flight.link import open_link
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.flight.row import problems
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.logs.telemetry import Telemetry
@@ -141,7 +141,7 @@ class Stage:
             raise
         contract = None if gear.commands else self._policy.contract
         session.bridge.settings_problems = problems(
-            examine(session.info, session.bridge.vehicle, self.settings, contract)
+            session.autopilot.check(session.bridge.vehicle, self.settings, contract)
         )
         self.session = session
         self.patience(PATIENCE_S)
@@ -206,7 +206,7 @@ class Stage:
         if self.watchdog is not None:
             if not self.stopped and now >= self._planned + PLAN_PERIOD:
                 self._planned = now
-                self.watchdog.plan(plan_of(session.bridge))
+                self.watchdog.plan(plan_of(session.bridge, session.autopilot.sticks))
             self.watchdog.step()
 
     @property
@@ -273,7 +273,7 @@ class Stage:
     def _by_hand(self, climb: float) -> None:
         bridge = self.session.bridge
         thrust = GRAVITY + 2.0 * (climb - float(self.rig.state.velocity[2]))
-        curve = bridge.sticks.throttle
+        curve = self.session.autopilot.sticks.throttle
         pulse = curve.channel_for(min(bridge.map.throttle(thrust, None), curve.largest))
         self.rig.set(override=False, roll=0.0, pitch=0.0, throttle=(pulse - 1500) / 500)
 

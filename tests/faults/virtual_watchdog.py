@@ -8,8 +8,8 @@ from typing import Any
 from unittest import mock
 
 from e2efly.flight.betaflight import watchdog
-from e2efly.flight.betaflight.link import Link
 from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.link import Link
 from tests.faults.faulty import inner
 
 UNUSED = "tcp:127.0.0.1:1"

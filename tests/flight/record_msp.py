@@ -24,8 +24,8 @@ from typing import Any
 
 from e2efly.flight.betaflight.client import MESSAGES, Client, ask, tell
 from e2efly.flight.betaflight.codec import Decoder, MspFrame, encode
-from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import Rc, set_raw_rc
+from e2efly.flight.link import open_link
 
 GOLDEN = Path(__file__).parents[1] / "data" / "msp_golden.json"
 SET_RC_TUNING, SET_RC_DEADBAND, DEBUG = 204, 218, 254

@@ -14,7 +14,7 @@ from e2efly.flight.betaflight import settings_by_name
 from e2efly.flight.betaflight.client import MESSAGES, Client, ask
 from e2efly.flight.betaflight.codec import Decoder, encode
 from e2efly.flight.betaflight.controller import identify
-from e2efly.flight.betaflight.link import Link, open_link
+from e2efly.flight.link import Link, open_link
 from e2efly.validation import binary
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from e2efly.flight.attitude import Attitude
+from e2efly.flight.betaflight.autopilot import Betaflight
 from e2efly.flight.betaflight.client import SCHEDULE, Client, Reply
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.instruments import Reading
@@ -43,8 +44,9 @@ class World:
     def __post_init__(self) -> None:
         self.wire, self.acts, self.throttle = Wire(), ThrottleHistory(), 0.0
         self.client = Client(self.wire, {code: rate for code, rate in SCHEDULE.items() if code != MotorTelemetry.CODE})
-        self.bridge = Bridge(self.client, self.info, self, load_vehicle("vis_r"), FlightSettings())
-        self.bridge.instruments = self  # type: ignore[assignment]
+        self.autopilot = Betaflight(self.client, self.info, FlightSettings())
+        self.bridge = Bridge(self.autopilot, self, load_vehicle("vis_r"), FlightSettings())
+        self.autopilot.instruments = self  # type: ignore[assignment]
         self.plant = self.bridge.map
 
     def close(self) -> None:

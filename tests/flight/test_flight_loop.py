@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from e2efly.flight.flight_loop import fly, plan_of
+from e2efly.flight.betaflight.descent_plan import plan_of
+from e2efly.flight.flight_loop import fly
 from e2efly.flight.pilot.flight_state import Flight, Mode
 from e2efly.flight.pilot.inertial import Inertial
 from e2efly.flight.pilot.throttle_map import ThrottleMap
@@ -32,10 +33,9 @@ class Grounded:
     worker = odometry = None
     land_now = flying = False
     height = 0.0
-    client = SimpleNamespace(link=SimpleNamespace(connections=1))
+    autopilot = SimpleNamespace(connections=1)
     sent = SimpleNamespace(throttle=0.0)
     estimate = SimpleNamespace(inertial=Inertial())
-    sticks = STICKS
 
     def __init__(self, *reasons: str, mode: Mode = Mode.INIT, armed_steps: int = 0) -> None:
         self.flight, self.armed_steps, self.steps = Flight(mode, reasons=reasons), armed_steps, 0
@@ -106,7 +106,7 @@ def test_it_ends_on_the_ground_only_when_the_pilot_has_disarmed(mode: Mode) -> N
 def test_a_bridge_that_the_watchdog_has_replaced_ends_when_it_is_asked_to_and_says_so() -> None:
     """Armed or not: it has no more say in the flight, and the watchdog lands on without it."""
     said: list[str] = []
-    watchdog: Any = SimpleNamespace(taken_over="", plan=lambda plan: None)
+    watchdog: Any = SimpleNamespace(taken_over="", follow=lambda bridge: None)
     bridge, clock = Grounded(mode=Mode.LAND, armed_steps=10**6), Clock()
 
     def stop() -> bool:
@@ -122,7 +122,7 @@ def test_a_bridge_that_the_watchdog_has_replaced_ends_when_it_is_asked_to_and_sa
 
 def test_on_the_ground_the_watchdog_keeps_the_throttle_of_an_armed_vehicle_closed() -> None:
     armed: Any = Grounded(armed_steps=1)
-    plan = plan_of(armed)
+    plan = plan_of(armed, STICKS)
     assert plan.flying and plan.throttle == ((0.0, 1000),)
     disarmed: Any = Grounded()
-    assert not plan_of(disarmed).flying
+    assert not plan_of(disarmed, STICKS).flying

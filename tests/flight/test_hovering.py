@@ -9,8 +9,8 @@ import pytest
 
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.control.place import ZERO, Place
+from e2efly.flight.betaflight.autopilot import check_hover, hover_schedule
 from e2efly.flight.betaflight.messages import MotorTelemetry
-from e2efly.flight.betaflight.settings_check import check_hover, hover_schedule
 from e2efly.flight.pilot import guidance
 from e2efly.flight.pilot.flight_state import Flight, Mode, Target
 from e2efly.flight.pilot.hover import LIFTED

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from e2efly.flight.betaflight.lifeline import Lifeline, watch
+from e2efly.flight.lifeline import Lifeline, watch
 
 HOLDER = """
 import sys
-from e2efly.flight.betaflight.lifeline import Lifeline
+from e2efly.flight.lifeline import Lifeline
 memory = bytearray(256 << 20)
 line = Lifeline()
 sys.stdout.write(f"{line.descriptor}\\n")

@@ -25,7 +25,7 @@ from e2efly.flight.betaflight.client import (
 )  # fmt: skip
 from e2efly.flight.betaflight.codec import ERROR, REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.controller import identify
-from e2efly.flight.betaflight.link import MOST, open_link
+from e2efly.flight.link import MOST, open_link
 from tests.flight.msp_golden import REPLIES, payload
 
 STICKS = messages.set_raw_rc([1500] * 8)

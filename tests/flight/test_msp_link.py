@@ -9,7 +9,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from e2efly.flight.betaflight.link import MAX_UNSENT, RETRY_S, StreamLink, open_link
+from e2efly.flight.link import MAX_UNSENT, RETRY_S, StreamLink, open_link
 from tests.waiting import until
 
 

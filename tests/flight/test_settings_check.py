@@ -19,7 +19,6 @@ from e2efly.flight.betaflight.codec import ERROR, MspFrame, encode
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
 from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.mode_slots import ModeRange
-from e2efly.flight.betaflight.row import Row, problems
 from e2efly.flight.betaflight.settings_check import NOT_TOLD, examine
 from e2efly.flight.betaflight.settings_messages import PidGains, RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, sticks_of
@@ -28,6 +27,7 @@ from e2efly.flight.pilot.estimate import StateEstimate
 from e2efly.flight.pilot.lag_watch import MeasuredLag
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pace import Half, Pace
+from e2efly.flight.row import Row, problems
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.sight.quality import SeenImages
 from e2efly.policy.contract import Contract

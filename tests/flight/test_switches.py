@@ -12,11 +12,11 @@ from e2efly.flight.betaflight.allowed_modes import ARM, HARMLESS, OVERRIDE, fore
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.mode_slots import ModeRange
 from e2efly.flight.betaflight.msp_names import BOXES
-from e2efly.flight.betaflight.row import Row, command_lines, problems
 from e2efly.flight.betaflight.settings_check import examine
 from e2efly.flight.betaflight.settings_messages import RxFailConfig
 from e2efly.flight.betaflight.sticks import RATES_PULSE, angle_range
 from e2efly.flight.betaflight.switches import switch_rows
+from e2efly.flight.row import Row, command_lines, problems
 from e2efly.flight.settings import FlightSettings
 from e2efly.vehicles.loading import load_vehicle
 from tests.flight.test_settings_check import NEWEST, recorded

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, InPlace, excitation
+from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE
+from e2efly.flight.excitation import ExcitationOptions, InPlace, excitation
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pilot.hover import rates_of

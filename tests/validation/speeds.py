@@ -5,8 +5,8 @@ import struct
 from dataclasses import dataclass, field, replace
 
 from e2efly.flight.betaflight.codec import Decoder, encode
-from e2efly.flight.betaflight.link import Link
 from e2efly.flight.betaflight.messages import MotorTelemetry
+from e2efly.flight.link import Link
 from e2efly.validation.rig import Rig
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from e2efly.control import COMMAND_MODES, Quat, Vec3
 from e2efly.flight.betaflight.client import SCHEDULE, Client
 from e2efly.flight.betaflight.controller import identify
-from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import set_raw_rc
 from e2efly.flight.betaflight.sticks import sticks_of
+from e2efly.flight.link import open_link
 from e2efly.flight.pilot.hover import flight_gains
 from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.logs.recording import Record, Stream

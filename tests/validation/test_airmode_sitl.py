@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from e2efly.flight.betaflight.messages import set_raw_rc
-from e2efly.flight.betaflight.row import problems
 from e2efly.flight.betaflight.settings_check import examine
 from e2efly.flight.betaflight.settings_messages import PidAdvanced
 from e2efly.flight.pilot.flight_state import Mode
+from e2efly.flight.row import problems
 from e2efly.validation import firmware_program, rig
 from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rig import Rig
@@ -27,7 +27,7 @@ def session_of(folder: Path, monkeypatch: pytest.MonkeyPatch, *lines: str) -> It
     monkeypatch.setattr(rig, "prepare", lambda sitl, settings: prepare(sitl, (*settings, *lines)))
     with Rig(firmware_program.chosen(), folder, VEHICLE) as running:
         session = Session(running, rehearsal_settings(1.0))
-        session.bridge.settings_problems = problems(examine(session.info, VEHICLE, session.settings))
+        session.bridge.settings_problems = problems(examine(session.autopilot.info, VEHICLE, session.settings))
         yield session
         session.close()
 
@@ -51,10 +51,10 @@ def bent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
 
 def torque_at_low_throttle(session: Session) -> float:
     """Largest difference of two motors while a held body is asked to roll as fast as it can, 0 to 1."""
-    running, mid = session.rig, session.bridge.sticks.centre
+    running, mid = session.rig, session.autopilot.sticks.centre
     running.set(override=True)
-    closed = session.bridge.sticks.arrange((mid, mid, mid, 1000), ())
-    rolling = session.bridge.sticks.channels_of(LOW, (10.0, 0.0, 0.0), ()).channels
+    closed = session.autopilot.sticks.arrange((mid, mid, mid, 1000), ())
+    rolling = session.autopilot.sticks.channels_of(LOW, (10.0, 0.0, 0.0), ()).channels
     _send(session, closed, 0.3)
     running.set(armed=True)
     _send(session, closed, 0.5)
@@ -66,19 +66,19 @@ def torque_at_low_throttle(session: Session) -> float:
 def _send(session: Session, channels: tuple[int, ...], seconds: float) -> None:
     for _ in range(round(seconds / 0.01)):
         session.rig.sleep(0.01)
-        session.client.poll(session.rig.now())
-        session.client.set_raw_rc(set_raw_rc(channels), session.rig.now())
+        session.autopilot.client.poll(session.rig.now())
+        session.autopilot.client.set_raw_rc(set_raw_rc(channels), session.rig.now())
 
 
 def test_with_airmode_it_takes_off(on: Session) -> None:
-    assert "AIRMODE" in on.info.features
+    assert "AIRMODE" in on.autopilot.info.features
     assert on.bridge.settings_problems == ()
     assert on.take_off()
 
 
 @pytest.mark.whole
 def test_without_airmode_it_is_refused_by_name_before_it_is_armed(off: Session) -> None:
-    assert "AIRMODE" not in off.info.features
+    assert "AIRMODE" not in off.autopilot.info.features
     refusal = "feature AIRMODE is off; needed: on: torque goes before thrust at any throttle (feature AIRMODE)"
     assert off.bridge.settings_problems == (refusal,)
     off.fly(0.5)
@@ -97,7 +97,7 @@ def test_without_airmode_torque_at_low_throttle_is_scaled_down(off: Session) -> 
 
 
 def test_what_bends_the_throttle_is_read_and_refused(bent: Session) -> None:
-    assert bent.info.pid_advanced == PidAdvanced(0, 7, 91, 0, 21)
+    assert bent.autopilot.info.pid_advanced == PidAdvanced(0, 7, 91, 0, 21)
     named = [problem.split()[0] for problem in bent.bridge.settings_problems]
     assert named == ["motor_output_limit", "throttle_boost", "thrust_linear"]
     bent.fly(0.5)

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from e2efly.flight.betaflight.link import StreamLink
+from e2efly.flight.link import StreamLink
 from e2efly.flight.sight.image_source import Frame
 from e2efly.policy.odometry import Sample
 from tests.faults import blocks

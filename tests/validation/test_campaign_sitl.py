@@ -77,7 +77,7 @@ def test_every_kind_can_strike_and_end(policy_of: Callable[..., Path], tmp_path:
     with Rig(firmware_program.chosen(), tmp_path, vehicle, latency=LATENCY_S) as rig:
         stage = Stage(rig, policy, goal, gear=Gear(watched=True, log=tmp_path / "flight.mcap"))
         stage.fly(0.2)
-        gravity = stage.session.client.latest[RawImu.CODE].message.acceleration
+        gravity = stage.session.autopilot.client.latest[RawImu.CODE].message.acceleration
         np.testing.assert_allclose(gravity, (0, 0, COUNTS), atol=1)
         faults, random = Faults(stage), np.random.default_rng(0)
         faults.attach()

@@ -10,7 +10,8 @@ from e2efly.alignment.alignment import align
 from e2efly.alignment.checks import checked
 from e2efly.alignment.identification import driver_of
 from e2efly.commands.align import pose_delay_of
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, ExcitationOptions, InPlace, StepsOptions, excitation
+from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE
+from e2efly.flight.excitation import ExcitationOptions, InPlace, StepsOptions, excitation
 from e2efly.flight.pilot.fence import fence_problem
 from e2efly.flight.pilot.flight_state import Mission, Mode, Reason
 from e2efly.flight.settings import Fence

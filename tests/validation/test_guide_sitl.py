@@ -80,7 +80,7 @@ def test_without_the_transmitter_the_motors_stop_within_a_second(room: Rig) -> N
 @pytest.mark.whole
 def test_the_first_flight_is_within_the_numbers_of_the_guide(room: Rig) -> None:
     session = Session(room, replace(SETTINGS, takeoff_height=0.6))
-    rows = examine(session.info, VEHICLE, SETTINGS)
+    rows = examine(session.autopilot.info, VEHICLE, SETTINGS)
     assert [row for row in rows if not row.good] == []  # the lines leave nothing to correct
     room.set(override=True, throttle=0.0)
     session.fly(1.0)

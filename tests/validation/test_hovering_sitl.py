@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from e2efly.flight.betaflight.autopilot import check_hover
 from e2efly.flight.betaflight.client import SCHEDULE, Client
 from e2efly.flight.betaflight.controller import identify
-from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import MotorTelemetry
-from e2efly.flight.betaflight.settings_check import check_hover
+from e2efly.flight.link import open_link
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.validation import firmware_program
@@ -53,7 +53,7 @@ def test_it_takes_off_holds_its_place_in_wind_and_lands(rig: Rig, name: str) -> 
         assert error(session.flown, 2.0) < 0.05
         assert session.bridge._hovering != session.bridge.hover.begin()
         if name == "indi":
-            told = session.client.message(MotorTelemetry.CODE, rig.now(), 0.1)
+            told = session.autopilot.client.message(MotorTelemetry.CODE, rig.now(), 0.1)
             assert told.speed == pytest.approx(np.asarray(rig.state.rotor_speed), rel=0.1)
         rig.wind = np.zeros(3)
         assert session.land(), session.bridge.flight.reasons

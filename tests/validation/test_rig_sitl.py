@@ -10,9 +10,9 @@ import pytest
 
 from e2efly.flight.betaflight.client import SCHEDULE, Client
 from e2efly.flight.betaflight.controller import ControllerInfo, identify
-from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import AttitudeReply, Rc, StatusEx, set_raw_rc
 from e2efly.flight.betaflight.sticks import Sticks, sticks_of
+from e2efly.flight.link import open_link
 from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.validation import firmware_program
 from e2efly.validation.rig import Rig

@@ -14,18 +14,14 @@ from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
 from e2efly.commands.fly_meta import record_meta
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.terminal import Terminal
-from e2efly.flight.betaflight.client import SCHEDULE, Client
-from e2efly.flight.betaflight.controller import ControllerInfo, identify
-from e2efly.flight.betaflight.link import Link, open_link
-from e2efly.flight.betaflight.row import problems
-from e2efly.flight.betaflight.settings_check import check_hover, examine, hover_schedule
-from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.autopilots import open_autopilot
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.commander.sources import open_commands
-from e2efly.flight.excitation import EXCITATION_SCHEDULE, NAMES, ExcitationOptions, StepsOptions, excitation
+from e2efly.flight.excitation import NAMES, ExcitationOptions, StepsOptions, excitation
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
+from e2efly.flight.link import open_link
 from e2efly.flight.log_record import Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
@@ -35,6 +31,7 @@ from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
 from e2efly.flight.publish import Live, targets_of
+from e2efly.flight.row import problems
 from e2efly.flight.service import Service
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.settings import check as check_settings
@@ -50,8 +47,6 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.vehicles.vehicle_rules import check_quadrotor
 
-CONNECT_S = 5.0
-"""How long the controller may take to send its first answer, s."""
 SLOWEST = 0.5
 """Largest `--latency`, s: with more delay no gains hold a hover."""
 
@@ -272,18 +267,18 @@ def run(options: Fly) -> int:
         commands = None if options.commands is None else open_commands(options.commands)
         if commands is not None:
             stack.callback(commands.close)
-        held: Link = WatchedLink(options.link) if options.watchdog and not options.check else open_link(options.link)
-        stack.callback(held.close)
-        client = Client(held, dict(EXCITATION_SCHEDULE if excited else SCHEDULE) | hover_schedule(hover))
-        info = _connect(client, options.link)
-        check_hover(options.hover, hover, info)
-        rows = examine(info, body, settings, contract)
+        autopilot, watchdog = open_autopilot(
+            options.link, settings, (options.hover, hover), watched=options.watchdog and not options.check,
+            excited=bool(excited),
+        )  # fmt: skip
+        stack.callback(autopilot.close)
+        rows = autopilot.check(body, settings, contract)
         print_settings(console, rows)
         worker = _worker(plan.runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
         bridge = Bridge(
-            client, info, source, body, settings, worker=worker, latency=options.latency,
+            autopilot, source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=plan.known, cameras=cameras,
             filter=plan.filter, hover=hover,
             neighbours=Neighbours(others, settings.odometry_timeout) if others else None,
@@ -309,8 +304,8 @@ def run(options: Fly) -> int:
         stack.callback(say.close)
         live.say = say
 
-        def again() -> ControllerInfo | None:
-            return _identify_again(bridge, body, settings, contract, say)
+        def again() -> bool:
+            return _identify_again(bridge, body, contract, say)
 
         for line in live.describe():
             say(f"live {line}")
@@ -318,7 +313,7 @@ def run(options: Fly) -> int:
             say(f"watch it at {shown.page.address}")
         say(f"{rate:g} Hz, log {path}. Ctrl-C lands.")
         timing = fly(
-            bridge, rate, log=log, live=live, watchdog=held if isinstance(held, WatchedLink) else None, say=say,
+            bridge, rate, log=log, live=live, watchdog=watchdog, say=say,
             stop=stop, identify_again=again, service=service,
         )  # fmt: skip
         telemetry.close()
@@ -383,28 +378,16 @@ def _read(path: Path, option: str) -> str:
         raise OSError(f"{option} {path}: {error.strerror}") from None
 
 
-def _connect(client: Client, link: str) -> ControllerInfo:
-    end = time.monotonic() + CONNECT_S
-    while not client.link.alive and time.monotonic() < end:
-        client.poll(time.monotonic())
-        time.sleep(0.01)
-    if not client.link.alive:
-        raise OSError(f"--link {link}: {client.link.reason}")
-    return identify(client, CONNECT_S)
-
-
-def _identify_again(
-    bridge: Bridge, body: Vehicle, settings: FlightSettings, contract: Any, say: Speaker
-) -> ControllerInfo | None:
-    """After a new connection, nothing that was read before is valid."""
+def _identify_again(bridge: Bridge, body: Vehicle, contract: Any, say: Speaker) -> bool:
+    """After a new connection, nothing that was read before is valid. Returns whether it could be read anew."""
     try:
-        info = identify(bridge.client, 1.0)
-        bridge.adopt(info, problems(examine(info, body, settings, contract)))
+        bridge.autopilot.identify(1.0)
     except (ValueError, TimeoutError) as error:
         bridge.settings_problems = (f"read anew: {error}",)
-        return None
+        return False
+    bridge.settings_problems = problems(bridge.autopilot.check(body, bridge.settings, contract))
     say("the controller was connected anew; its settings were read again")
-    return info
+    return True
 
 
 def _flies(options: Fly, plan: _Prepared) -> dict[str, Any]:

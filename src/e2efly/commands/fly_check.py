@@ -11,8 +11,6 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly.commands.terminal import headed
-from e2efly.flight.betaflight.messages import StatusEx
-from e2efly.flight.betaflight.row import Row, command_lines, problems
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander
 from e2efly.flight.pilot.estimate import StateEstimate
@@ -22,6 +20,7 @@ from e2efly.flight.pilot.refusals import take_off_refusals
 from e2efly.flight.pilot.sensing import sensed
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.process import printable
+from e2efly.flight.row import Row, command_lines, problems
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.flight.sight.picture import blocks, colours, sheet, write_png
 from e2efly.flight.sight.quality import SeenImages
@@ -140,11 +139,9 @@ def refuse_in_flight(bridge: Bridge) -> None:
     Raises:
         ValueError: when the controller is armed and its override is on.
     """
-    end, known = time.monotonic() + STATUS_S, set[float]()
-    while (now := time.monotonic()) < end and len(known) < STATUSES:
+    end, before = time.monotonic() + STATUS_S, bridge.autopilot.statuses
+    while (now := time.monotonic()) < end and bridge.autopilot.statuses < before + STATUSES:
         bridge.look(now)
-        if (reply := bridge.client.latest.get(StatusEx.CODE)) is not None:
-            known.add(reply.time)
         time.sleep(0.005)
     if bridge.inputs.armed and bridge.inputs.override:
         raise ValueError(

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from e2efly import __version__
-from e2efly.flight.betaflight.row import Row
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot import throttle_map
+from e2efly.flight.row import Row
 from e2efly.vehicles.vehicle import Vehicle
 
 
@@ -37,7 +37,7 @@ def record_meta(
     }
     versions = {
         "e2efly": __version__, "python": sys.version.split()[0], "machine": platform.platform(),
-        "firmware": bridge.info.firmware, "msp": ".".join(map(str, bridge.info.api)),
+        **bridge.autopilot.versions,
     }  # fmt: skip
     log.record("meta", time.monotonic(), {
         "contract": contract, "vehicle": f"{body.name} {body.hash}", "settings": json.dumps(settings, default=str),

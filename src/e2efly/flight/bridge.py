@@ -1,4 +1,4 @@
-"""The bridge: at each control step, it turns poses and the flight controller's replies into stick commands."""
+"""The bridge: at each control step, it turns poses and what the autopilot reports into commands."""
 
 import dataclasses
 import math
@@ -10,20 +10,14 @@ import numpy as np
 
 from e2efly.control import Ctbr, Quat, Vec3
 from e2efly.flight.attitude import Attitude, turned
-from e2efly.flight.betaflight.client import Client, Reply
-from e2efly.flight.betaflight.controller import ControllerInfo
-from e2efly.flight.betaflight.instruments import CLOSED, PROBE, ChannelProbe, Instruments, Reading
-from e2efly.flight.betaflight.messages import AttitudeReply, MotorTelemetry, RawImu, set_raw_rc
-from e2efly.flight.betaflight.sticks import sticks_of
+from e2efly.flight.autopilot import Autopilot, AutopilotState
 from e2efly.flight.filter.filter import Filter
 from e2efly.flight.filter.guard import Keeper
 from e2efly.flight.log_record import (
     Log,
     Sent,
     record_filter,
-    record_link,
     record_map,
-    record_message,
     record_mode,
     record_odometry,
     record_policy,
@@ -84,8 +78,7 @@ class Bridge:
 
     def __init__(
         self,
-        client: Client,
-        info: ControllerInfo,
+        autopilot: Autopilot,
         source: PoseSource,
         vehicle: Vehicle,
         settings: FlightSettings,
@@ -103,8 +96,7 @@ class Bridge:
         """Create a bridge for a vehicle on the ground.
 
         Args:
-            client: sends requests to the controller.
-            info: what the controller reported about itself.
+            autopilot: the identified flight controller.
             source: delivers poses.
             vehicle: the loaded vehicle.
             settings: what the flight may do.
@@ -123,7 +115,7 @@ class Bridge:
         """
         check_quadrotor(vehicle, "a flight")
         delay: float = vehicle.latency if latency is None else latency
-        self.client, self.source, self.vehicle, self.settings = client, source, vehicle, settings
+        self.autopilot, self.source, self.vehicle, self.settings = autopilot, source, vehicle, settings
         self.gentle = flight_gains(vehicle, delay)
         """The vehicle with gains that suit the latency."""
         self.hover = hover or hover_controller(DEFAULT, vehicle, delay)
@@ -136,8 +128,8 @@ class Bridge:
         images = () if worker is None else worker.images
         self.seen = tuple(SeenImages(image) for image, _ in zip(images, self.cameras, strict=True))
         """What is known about each camera."""
-        self.instruments = Instruments(client, settings)
-        self.adopt(info, settings_problems)
+        self.settings_problems = settings_problems
+        """Why the autopilot's settings, as they were read, forbid a take-off."""
         self.flight, self.inputs = Flight(home=settings.ground_height), Inputs()
         self.estimate = StateEstimate(Checks(max_age=settings.odometry_timeout), delay + LATE_S)
         self.map = throttle_map or ThrottleMap.of(vehicle)
@@ -145,7 +137,7 @@ class Bridge:
         """Thrust that compensates for an error of the throttle map, m/s^2."""
         self.imu: Imu | None = None
         """The newest credible measurement of the inertial sensors."""
-        self.sent = Sent("closed", None, 0.0, self._closed())
+        self.sent = Sent("closed", None, 0.0, ())
         self.keeper = None if filter is None else Keeper(filter)
         self._hovering, self._under_way = self.hover.begin(), UnderWay()
         self._history = ThrottleHistory(HISTORY_S)
@@ -154,11 +146,6 @@ class Bridge:
         self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
         self._held, self._looked = self.sent, 0.0
         self._unlike: str | None = None
-
-    def adopt(self, info: ControllerInfo, settings_problems: tuple[str, ...]) -> None:
-        """Take over the controller's settings as they were read, and the reasons why they forbid a take-off."""
-        self.info, self.sticks, self.settings_problems = info, sticks_of(info), settings_problems
-        self.probe = ChannelProbe()
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
@@ -169,15 +156,15 @@ class Bridge:
         self._under_way = sent(self._under_way, self.sent.command or CUT, dt, self.vehicle, self.latency)
         late = (*self._overdue, now) if lateness > self.settings.lateness else self._overdue
         self._overdue = tuple(moment for moment in late if moment >= now - 1.0)
-        _, reading = self._perceive(now)
+        _, report = self._perceive(now)
         self._decide(now, slack)
         self.sent = self._send(now, *self._kept(now, *self._command(now, dt)))
         if self.log is not None:
-            self._record(self.log, now, reading)
+            self._record(self.log, now, report)
         return self.sent
 
     def look(self, now: float) -> list[Sample]:
-        """Read poses and the controller's replies, without deciding or sending anything. Returns the poses."""
+        """Read poses and the autopilot, without deciding or sending anything. Returns the poses."""
         return self._perceive(now, sends=False)[0]
 
     @property
@@ -208,18 +195,22 @@ class Bridge:
         target = self.flight.target
         return (None, None) if target is None else (list(target.position), target.yaw)
 
-    def _perceive(self, now: float, *, sends: bool = True) -> tuple[list[Sample], Reading]:
-        """Read poses and the controller's replies, and combine them."""
-        self.client.poll(now)
-        if now - self.client.heard > SILENT_S:
+    def _perceive(self, now: float, *, sends: bool = True) -> tuple[list[Sample], AutopilotState]:
+        """Read poses and the autopilot, and combine them."""
+        autopilot = self.autopilot
+        autopilot.poll(now)
+        if now - autopilot.heard > SILENT_S:
             self._heard_since = now
-        if now - self.client.heard > self.settings.link_timeout and not self.client.lossy(now):
+        if now - autopilot.heard > self.settings.link_timeout and not autopilot.uncertain(now):
             self._broken = now
-        if self.client.heard >= self._looked:
+        if autopilot.heard >= self._looked:
             self._held = self.sent  # a controller that is not heard from now on has at least this one
         self._looked = now
-        samples, attitude = self.source.read(now), self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
+        samples, known = self.source.read(now), autopilot.attitude(now, ATTITUDE_S)
+        attitude = None if known is None else known[0]
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
+        if samples and self.odometry is not None:
+            autopilot.pose(now, self.odometry)
         if self.worker is not None:
             self.worker.hear(self.odometry, now)
         if self.neighbours is not None:
@@ -229,15 +220,14 @@ class Bridge:
             quality.see(seen, camera.read(now), now, odometry, self.settings.ground_height, camera.problem)
             for seen, camera in zip(self.seen, self.cameras, strict=True)
         )
-        reading = self.instruments.read(now, self.info, land=self.land_now, sends=sends)
-        self.inputs = self._judge(now, reading, sends=sends)
-        self._feel(now, reading)
-        return samples, reading
+        report = autopilot.read(now, land=self.land_now, sends=sends, grounded=self.flight.mode is Mode.INIT)
+        self.inputs = self._judge(now, report)
+        self._feel(now, report)
+        return samples, report
 
-    def _judge(self, now: float, reading: Reading, *, sends: bool) -> Inputs:
+    def _judge(self, now: float, report: AutopilotState) -> Inputs:
         """The inputs of the state machine."""
         flight, mode = self.flight, self.flight.mode
-        probed = self.probe.look(now, reading, self.sticks, grounded=mode is Mode.INIT) if sends else ()
         begins = mode is not Mode.POLICY or now - flight.since < WATCHED_S
         measure = begins and self._ticks % MEASURE_STEPS == 0
         self.estimate = told = estimate.compare(self.estimate, mode, measure=measure)
@@ -248,23 +238,21 @@ class Bridge:
         return Inputs(
             odometry=told.odometry,
             odometry_problem=told.pose_problem,
-            link_problem=reading.link_problem,
-            silent=now - self.client.heard > SILENT_S,
-            failsafe=reading.failsafe,
-            armed=reading.armed,
-            override=reading.override,
-            pilot=reading.pilot,
-            voltage=reading.voltage,
+            link_problem=report.link_problem,
+            silent=now - self.autopilot.heard > SILENT_S,
+            failsafe=report.failsafe,
+            armed=report.armed,
+            override=report.override,
+            pilot=report.pilot,
+            voltage=report.voltage,
             settings_problems=(
                 *self.settings_problems,
-                *probed,
-                *reading.meddling,
-                *reading.armed_with,
+                *report.problems,
                 *((slow,) if slow else ()),
             ),
-            policy_problem=reading.meddling[0] if reading.meddling else self._blindness(now) or self._unfiltered,
+            policy_problem=report.policy_problem or self._blindness(now) or self._unfiltered,
             filtered=self.keeper is not None,
-            attitude_error=told.attitude_error(reading.attitude),
+            attitude_error=told.attitude_error(report.attitude),
             heading_error=told.heading_error,
             missed_deadlines=len(self._overdue),
             accelerometer_problem=told.accelerometer_problem(mode),
@@ -286,22 +274,22 @@ class Bridge:
         """Why the filter cannot keep a policy inside the fence. None: it can, or there is no filter."""
         return None if self.keeper is None else self.keeper.problem
 
-    def _feel(self, now: float, reading: Reading) -> None:
+    def _feel(self, now: float, report: AutopilotState) -> None:
         """Process the inertial sensors. In the air they teach the throttle map and propagate the velocity."""
-        flight, inputs = self.flight, self.inputs
-        attitude = self.client.message(AttitudeReply.CODE, now, ATTITUDE_S)
-        if (reply := reading.fresh.get(RawImu.CODE)) is not None:
+        flight, inputs, autopilot = self.flight, self.inputs, self.autopilot
+        attitude = autopilot.attitude(now, ATTITUDE_S)
+        if (reading := report.inertial) is not None:
             flying = self.flying and abs(self.height) > LIFTED and inputs.armed
             seen = inputs.seen if flying and not flight.misled else None
-            late = self._late(reply, now)
-            asked = reply.time - late
-            known = now - self._broken > ANEW_S and not self.client.steered(now)
-            acts = known and self.client.delivered(asked - ACTING_S, asked) and not reading.failsafe
-            came = known and self.client.delivered(min(self.estimate.inertial.time, asked), asked, RARELY_S)
-            sent = None if reading.failsafe else self._history.felt(asked)
+            asked = reading.asked
+            known = now - self._broken > ANEW_S
+            acts = known and autopilot.delivered(asked - ACTING_S, asked) and not report.failsafe
+            came = known and autopilot.delivered(min(self.estimate.inertial.time, asked), asked, RARELY_S)
+            sent = None if report.failsafe else self._history.felt(asked)
             before = [throttle for lag in LAGS if (throttle := self._history.felt(asked - lag)) is not None]
             measured = Measurement(
-                np.array(reply.message.acceleration, float), np.array(reply.message.body_rate), attitude,
+                np.array(reading.acceleration, float), np.array(reading.body_rate),
+                None if attitude is None else attitude[0],
                 None if sent is None else self.map.expected(sent, inputs.voltage),
                 tuple(self.map.force(t, inputs.voltage) for t in before) if len(before) == len(LAGS) else (),
                 asked,
@@ -312,7 +300,8 @@ class Bridge:
             )  # fmt: skip
             if self.keeper is not None:
                 self.keeper.feel(measured.gyro, asked)
-            self.estimate = estimate.feel(self.estimate, measured, asked + late / 2, flight.mode, now)
+            halfway = (asked + reading.time) / 2
+            self.estimate = estimate.feel(self.estimate, measured, halfway, flight.mode, now)
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)
                 if sent is not None and acts and flying and not flight.blind:
@@ -320,7 +309,7 @@ class Bridge:
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
 
         def lift(throttle: float | None) -> tuple[float, float] | None:
-            if throttle is None or not self.flying or reading.failsafe:
+            if throttle is None or not self.flying or report.failsafe:
                 return None
             thrust, doubt = self.map.expected(throttle, inputs.voltage)
             stood = flight.mode is Mode.TAKEOFF and self.height < LIFTED
@@ -404,28 +393,24 @@ class Bridge:
         """The controller's attitude when the next command acts: the newest one, turned by what was sent since. None: it
         came more than `oldest` s ago.
         """
-        reply = self.client.latest.get(AttitudeReply.CODE)
-        if reply is None or now - reply.time > oldest:
+        known = self.autopilot.attitude(now, oldest)
+        if known is None:
             return None
-        attitude, asked = reply.message, reply.time - self._late(reply, now)
+        attitude, asked = known
         for (time, rate), (until, _) in pairwise((*self._turns, (now, (0.0, 0.0, 0.0)))):
             attitude = turned(attitude, rate, until - max(time, asked)) if until > asked else attitude
         return attitude
 
-    def _late(self, reply: Reply, now: float) -> float:
-        """How long ago a reply was asked for when it came, s."""
-        return min(reply.latency, self.client.quickest) if self.client.lossy(now) else reply.latency
-
     def _motion(self, now: float, odometry: Odometry) -> Seen:
         """The inputs of the hover controller."""
-        inertial, told = self.estimate.inertial, self.client.message(MotorTelemetry.CODE, now, FRESH_S)
+        inertial, speeds = self.estimate.inertial, self.autopilot.rotor_speeds(now, FRESH_S)
         force = inertial.force if now - inertial.time < FRESH_S else None
         return Seen(
             Vec3(*odometry.position.tolist()), Vec3(*odometry.velocity.tolist()), Quat(*odometry.quaternion.tolist()),
             Vec3(*odometry.body_rate.tolist()),
             force=None if force is None else Vec3(*force.tolist()),
             age=max(now - odometry.time, 0.0),
-            thrust=None if told is None else thrust_of(self.vehicle, told.speed),
+            thrust=None if speeds is None else thrust_of(self.vehicle, speeds),
         )  # fmt: skip
 
     def _kept(self, now: float, source: str, command: Ctbr | None) -> tuple[str, Ctbr | None]:
@@ -447,33 +432,27 @@ class Bridge:
         return source, command
 
     def _send(self, now: float, source: str, command: Ctbr | None) -> Sent:
-        if command is None:
-            sent = Sent(source, None, 0.0, self._closed())
-        else:
-            throttle = self.map.throttle(float(command.thrust), self.inputs.voltage)
-            stick = self.sticks.channels_of(min(throttle, self.sticks.throttle.largest), rates_of(command), ())
-            sent = Sent(source, command, throttle, stick.channels, stick.saturated)
-        acts = sent if self.client.set_raw_rc(set_raw_rc(sent.channels), now) else self._held
+        throttle = None if command is None else self.map.throttle(float(command.thrust), self.inputs.voltage)
+        rates = (0.0, 0.0, 0.0) if command is None else rates_of(command)
+        out = self.autopilot.send(now, throttle, rates)
+        sent = Sent(source, command, throttle or 0.0, out.channels, out.saturated)
+        acts = sent if out.alive else self._held
         self._history.add(now, acts.throttle)
         self._turns.append((now, acts.rate))
         return sent
 
-    def _closed(self) -> tuple[int, ...]:
-        """The channels with the throttle closed. Before arming, the other sticks differ slightly from their centre, for
-        the probe.
-        """
-        apart = (0, 0, 0) if self.inputs.armed or self.probe.seen else PROBE
-        return self.sticks.arrange((*(self.sticks.centre + offset for offset in apart), CLOSED), ())
-
-    def _record(self, log: Log, now: float, reading: Reading) -> None:
+    def _record(self, log: Log, now: float, report: AutopilotState) -> None:
         if self.odometry is not None and self.inputs.odometry_problem is None:
             record_odometry(log, now, self.odometry)
         if self.keeper is not None and self.keeper.change is not None:
             record_filter(log, now, self.keeper.change)
         record_sent(log, now, self.sent, str(self.flight.mode), *self.setpoint)
-        for code, reply in reading.fresh.items():
-            record_message(log, self.info, code, reply, self.imu)
+        for channel, time, values in report.records:
+            log.record(channel, time, values)
+        if report.inertial is not None and self.imu is not None:
+            force = self.imu.accelerometer.tolist()
+            log.record("imu", report.inertial.time, {"gyro": list(report.inertial.body_rate), "specific_force": force})
         if self._ticks % 20 == 0:
             record_map(log, now, self.map)
         if self._ticks % 50 == 0:
-            record_link(log, now, self.client)
+            log.record("link", now, self.autopilot.link_record())

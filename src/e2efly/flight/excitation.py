@@ -27,8 +27,6 @@ from e2efly.control.manoeuvres import (
     softened,
 )
 from e2efly.control.step_schedule import Steps
-from e2efly.flight.betaflight.client import SCHEDULE
-from e2efly.flight.betaflight.messages import Motor, RawImu
 from e2efly.flight.pilot.hover import FlightMotion, flight_gains
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.contract import CONTRACT_VERSION, Action, Contract
@@ -39,9 +37,6 @@ from e2efly.vehicles.vehicle import Vehicle
 
 CONTROL_RATE = 100.0
 """The rate at which it acts, Hz."""
-EXCITATION_SCHEDULE = SCHEDULE | {RawImu.CODE: 100.0, Motor.CODE: 100.0}
-"""The highest rate at which each message is requested, Hz. Inertia and motor lag show only in the gyroscope and the
-motor outputs."""
 MARGIN, FLOOR = 0.3, 0.6
 """The distance that it keeps to the inside of the fence, m, and its lowest height over the ground, m."""
 SLOWEST, LEAST_HEIGHT = 1.2, 1.0

@@ -9,32 +9,20 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from typing import Protocol
 
-import numpy as np
-
-from e2efly.control import Ctbr
-from e2efly.flight.betaflight.controller import ControllerInfo
-from e2efly.flight.betaflight.descent import Sense
-from e2efly.flight.betaflight.instruments import CLOSED
-from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
-from e2efly.flight.pilot.hover import blind, blind_time, sink_time
 from e2efly.flight.process import printable, threads
 from e2efly.flight.publish import Live
 from e2efly.flight.service import Service
-from e2efly.vehicles.gravity import GRAVITY
 
 LOWEST_RATE = 100.0
 """The lowest rate of the loop, Hz."""
 PLAN_PERIOD = 0.1
 """The period at which the watchdog is given a new plan, s."""
-PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))
-"""Body rates of the watchdog's tables, rad/s."""
-PLAN_FORCES = tuple(float(i) for i in range(26))
-"""Specific forces of the watchdog's table, m/s^2."""
 SWITCH_S = 1e-4
 """The longest time for which another thread of the process may delay the loop, s. Python's default is 5 ms."""
 LOOP_PRIORITY, POLICY_PRIORITY, OTHER_PRIORITY = 10, 9, 8
@@ -54,6 +42,19 @@ def loop_rate(control_rate: float) -> float:
     return control_rate * max(math.ceil(LOWEST_RATE / control_rate - 1e-9), 1)
 
 
+class Watchdog(Protocol):
+    """What lands the vehicle when this process dies."""
+
+    @property
+    def taken_over(self) -> str:
+        """Why it has taken over. Empty: it has not."""
+        ...
+
+    def follow(self, bridge: Bridge) -> None:
+        """Learn what to do if the bridge falls silent from now on. It must not block."""
+        ...
+
+
 @dataclass
 class Timing:
     """The timing statistics of the loop."""
@@ -71,10 +72,10 @@ def fly(
     *,
     log: Log | None = None,
     live: Live | None = None,
-    watchdog: WatchedLink | None = None,
+    watchdog: Watchdog | None = None,
     say: Callable[[str], None] = print,
     stop: Callable[[], bool] = lambda: False,
-    identify_again: Callable[[], ControllerInfo | None] | None = None,
+    identify_again: Callable[[], bool] | None = None,
     service: Service | None = None,
     clock: Clock = MONOTONIC,
 ) -> Timing:
@@ -89,14 +90,15 @@ def fly(
         watchdog: receives a plan for the case that this process falls silent.
         say: takes lines for people. It must not block. If it raises, the exception and its line are dropped.
         stop: whether to end. A vehicle in the air is landed first.
-        identify_again: reads the controller's settings again after a reconnection on the ground.
+        identify_again: reads the autopilot's settings again after a reconnection on the ground. Returns whether it
+            could.
         service: tells the service manager that the loop is running.
         clock: gives the time.
     """
     timing, period = Timing(), 1 / rate
     due = clock.now() + period
     last_plan = last_status = cpu_at = due
-    cpu, told, connection = time.process_time(), "", bridge.client.link.connections
+    cpu, told, connection = time.process_time(), "", bridge.autopilot.connections
     previous = clock.now()
     with _no_pauses(bridge):
         while True:
@@ -112,9 +114,9 @@ def fly(
                     return timing
                 if watchdog is not None and watchdog.taken_over:  # it goes on landing without this process
                     return timing
-            if bridge.client.link.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
-                if identify_again is not None and identify_again() is not None:
-                    connection = bridge.client.link.connections
+            if bridge.autopilot.connections != connection and bridge.flight.mode in (Mode.INIT, Mode.DONE):
+                if identify_again is not None and identify_again():
+                    connection = bridge.autopilot.connections
                 due = now = clock.now()
                 late = 0.0
             bridge.tick(now, late, slack=period / 2)
@@ -124,7 +126,7 @@ def fly(
                 live.show(bridge.seen)
             if watchdog is not None and now - last_plan >= PLAN_PERIOD:
                 last_plan = now
-                watchdog.plan(plan_of(bridge))
+                watchdog.follow(bridge)
             if (line := _told(bridge)) != told:
                 told = line
                 _say(say, _told(bridge, in_full=True))
@@ -149,54 +151,6 @@ def fly(
             due += period
             if done > due:  # missed rounds are not made up for: no burst to catch up
                 due += math.ceil((done - due) / period) * period
-
-
-def plan_of(bridge: Bridge) -> DescentPlan:
-    """What the watchdog has to do from now on if the bridge falls silent."""
-    sticks, voltage = bridge.sticks, bridge.inputs.voltage
-
-    def throttle(command: Ctbr) -> int:
-        share = min(bridge.map.throttle(float(command.thrust), voltage), sticks.throttle.largest)
-        return sticks.throttle.channel_for(share)
-
-    roll, pitch, yaw = (tuple(sticks.pulse(axis, rate) for rate in PLAN_RATES) for axis in range(3))
-    climb = float(bridge.odometry.velocity[2]) if bridge.odometry is not None else 0.0
-    begin = sink_time(climb)
-    end = max(blind_time(bridge.height, climb), 2 * begin)
-    steps = ((0.0, CLOSED),) if bridge.flight.mode in (Mode.INIT, Mode.DONE) else (
-        (0.0, throttle(blind(None, 0.0, climb))), (begin, throttle(blind(None, 2 * begin + 1.0, climb))), (end, CLOSED),
-    )  # fmt: skip
-    a, b, c, d = sticks.channel[:4]
-    mid = sticks.centre
-    idle = sticks.arrange((mid, mid, mid, CLOSED), ())
-    flying = bridge.flying or bridge.flight.mode is Mode.PILOT or bridge.inputs.armed
-    sense = None if len(steps) == 1 else _sense(bridge)
-    return DescentPlan(flying, PLAN_RATES, (roll, pitch, yaw), (a, b, c, d), steps, idle, sense)
-
-
-def _sense(bridge: Bridge) -> Sense | None:
-    """What the watchdog's descent by the accelerometer starts from. None: nothing is known of the motion."""
-    told, sticks = bridge.estimate.inertial, bridge.sticks
-    moves = told.reckoned
-    if moves is None:
-        return None
-    table: dict[int, float] = {}  # by pulse, because a throttle has a largest
-    for force in PLAN_FORCES:
-        share = min(bridge.map.throttle(force, bridge.inputs.voltage), sticks.throttle.largest)
-        table.setdefault(sticks.throttle.channel_for(share), force)
-    gravity = 0.0 if told.rest is None or told.frozen else float(np.linalg.norm(told.rest))
-    forward, left, _ = moves.velocity
-    attitude = moves.attitude
-    return Sense(
-        unit=told.scale.value * GRAVITY / gravity if gravity > 0 else 0.0,
-        forces=tuple(table.values()),
-        pulses=tuple(table),
-        doubt=bridge.map.doubt,
-        share=told.share,
-        velocity=(forward, left, moves.climb),
-        upright=1.0 if attitude is None else math.cos(attitude.roll) * math.cos(attitude.pitch),
-        height=moves.height - bridge.flight.home,
-    )
 
 
 def _say(say: Callable[[str], None], line: str) -> None:

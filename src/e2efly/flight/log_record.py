@@ -5,17 +5,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from e2efly.control import Ctbr
-from e2efly.flight.betaflight.allowed_modes import ARM
-from e2efly.flight.betaflight.client import Client, Reply
-from e2efly.flight.betaflight.controller import ControllerInfo
-from e2efly.flight.betaflight.messages import AttitudeReply, BatteryState, Motor, RawImu, Rc, StatusEx
 from e2efly.flight.commander.commander import Commander
 from e2efly.flight.filter.guard import CommandChange
 from e2efly.flight.pilot.flight_state import Flight
 from e2efly.flight.pilot.hover import rates_of
 from e2efly.flight.pilot.throttle_map import ThrottleMap
 from e2efly.policy.odometry import Odometry
-from e2efly.policy.runtime import Imu
 from e2efly.policy.worker import Worker
 
 
@@ -51,7 +46,7 @@ class Sent:
     throttle: float
     """Throttle, 0 to 1."""
     channels: tuple[int, ...]
-    """Pulse width of each channel, us."""
+    """Pulse width of each stick channel, us. Empty: the autopilot takes no sticks."""
     saturated: tuple[str, ...] = ()
 
     @property
@@ -127,35 +122,3 @@ def record_map(log: Log, now: float, throttle_map: ThrottleMap) -> None:
         "scale": throttle_map.scale * throttle_map.nominal(1.0), "voltage_gain": throttle_map.learned[1],
         "residual": throttle_map.residual,
     })  # fmt: skip
-
-
-def record_link(log: Log, now: float, client: Client) -> None:
-    """Record the quality of the link to the controller."""
-    log.record("link", now, {
-        "requests": client.requests,
-        "replies": client.replies,
-        "timeouts": client.timeouts,
-        "errors": client.decoder.bad_checksums + client.decoder.skipped + client.run_together,
-        "reconnects": max(client.link.connections - 1, 0),
-        "round_trip": max((reply.latency for reply in client.latest.values()), default=None),
-    })  # fmt: skip
-
-
-def record_message(log: Log, info: ControllerInfo, code: int, reply: Reply, imu: Imu | None) -> None:
-    """Record a reply of the controller."""
-    m, at = reply.message, reply.time
-    if code == StatusEx.CODE:
-        log.record("status", at, {
-            "armed": ARM in m.active(info.box_ids), "modes": [str(box) for box in sorted(m.active(info.box_ids))],
-            "cpu_load": m.cpu_load, "arming_disabled": list(m.arming_disabled), "cycle_time": m.cycle_time,
-        })  # fmt: skip
-    elif code == Rc.CODE:
-        log.record("rc", at, {"channels": list(m.channels)})
-    elif code == Motor.CODE:
-        log.record("motors", at, {"values": list(m.throttle)})
-    elif code == BatteryState.CODE:
-        log.record("battery", at, {"voltage": m.voltage, "current": m.current, "cells": m.cells})
-    elif code == RawImu.CODE and imu is not None:
-        log.record("imu", at, {"gyro": list(m.body_rate), "specific_force": imu.accelerometer.tolist()})
-    elif code == AttitudeReply.CODE:
-        log.record("imu", at, {"attitude": [m.roll, m.pitch, m.yaw]})

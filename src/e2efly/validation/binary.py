@@ -13,9 +13,9 @@ import numpy as np
 
 from e2efly.config.storage import cache_folder
 from e2efly.flight.betaflight.client import Client, ask
-from e2efly.flight.betaflight.link import open_link
 from e2efly.flight.betaflight.messages import ApiVersion, FcVariant, FcVersion, RawImu
 from e2efly.flight.betaflight.versions import RELEASES, version_text
+from e2efly.flight.link import open_link
 from e2efly.validation.firmware_program import IDENTITY, Firmware, identified, shim
 from e2efly.validation.sitl import RESTING, Sitl
 

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.betaflight.client import SCHEDULE, Client
-from e2efly.flight.betaflight.controller import identify
-from e2efly.flight.betaflight.link import Link, open_link
-from e2efly.flight.betaflight.settings_check import hover_schedule
+from e2efly.flight.betaflight.autopilot import Betaflight
+from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, loop_rate
+from e2efly.flight.link import Link, open_link
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController
@@ -81,9 +80,9 @@ class Session:
         """
         vehicle = vehicle or rig.world.vehicle
         self.rig, self.settings = rig, settings
-        asked = dict(schedule) | ({} if hover is None else hover_schedule(hover))
-        self.client = Client(link or open_link(rig.sitl.msp), asked)
-        self.info = identify(self.client, 3.0, clock=rig)
+        self.autopilot = Betaflight.connect(
+            link or open_link(rig.sitl.msp), settings, schedule, hover=hover, timeout=3.0, clock=rig
+        )
         self.worker: PolicyWorker | None = None
         rate = LOWEST_RATE
         if policy is not None and course is not None:
@@ -99,7 +98,7 @@ class Session:
         self.period = 1 / rate
         self.source = source or PlantSource(rig.poses, "rig")
         self.bridge = Bridge(
-            self.client, self.info, self.source, vehicle, settings,
+            self.autopilot, self.source, vehicle, settings,
             worker=self.commander or self.worker, log=log, latency=late, cameras=cameras,
             filter=fastest(Filter.of(vehicle, settings.fence, late))[0] if filtered else None, hover=hover,
             neighbours=neighbours,
@@ -112,7 +111,7 @@ class Session:
         """End the policy's thread and the link."""
         if self.worker is not None:
             self.worker.close()
-        self.client.link.close()
+        self.autopilot.close()
 
     def step(self) -> None:
         """Run one control period."""

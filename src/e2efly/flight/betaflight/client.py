@@ -9,10 +9,11 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from e2efly.flight.autopilot import HOLE
 from e2efly.flight.betaflight import messages, mode_slots, settings_messages
 from e2efly.flight.betaflight.codec import ERROR, REQUEST, Decoder, MspFrame, encode
-from e2efly.flight.betaflight.link import MOST, Link
 from e2efly.flight.clock import MONOTONIC, Clock
+from e2efly.flight.link import MOST, Link
 
 MESSAGES: dict[int, Any] = {
     kind.CODE: kind
@@ -52,8 +53,6 @@ behind, or replies were lost. Unless `lossy` shows the latter, messages are requ
 LOSSY_S, LOSSY_TIMEOUT = 0.3, 0.03
 """A line that has carried bytes that are no frame within the first value, s, loses replies. The limit is then
 `PATIENCE` times the quickest reply's time, but at least the second value, s."""
-HOLE = 0.1
-"""Between two acknowledged stick frames that are further apart than this, s, other frames may not have arrived."""
 TOLD_S = 0.03
 """An acknowledgement that takes longer than twice the newest reply's time plus this, s, may be for a later frame."""
 CROWDED_S, CROWDED = 1.0, 3.0

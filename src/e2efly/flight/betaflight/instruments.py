@@ -86,6 +86,8 @@ class Instruments:
 
     client: Client
     settings: FlightSettings
+    statuses: int = 0
+    """Number of messages so far that tell whether the controller is armed."""
     _armed: Twice[bool] = field(default_factory=lambda: Twice(False))
     _heard: Twice[bool] = field(default_factory=lambda: Twice(False))
     """Whether the controller hears the pilot's receiver."""
@@ -116,6 +118,7 @@ class Instruments:
             read = f"{info.rate_profile}, whose rates were read: switch back, or start again"
             meddling.append(f"rateprofile is {status.rate_profile}; accepted: {read}")
         if status is not None and StatusEx.CODE in fresh:
+            self.statuses += 1
             self._armed.hear(ARM in active)
             self._heard.hear(FAILSAFE not in active and not RECEIVER_LOST & set(status.arming_disabled))
             kept = {box: last for box, last in self._foreign.items() if ARM in active or now - last < ARMING_S}

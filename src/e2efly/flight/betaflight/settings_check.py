@@ -5,15 +5,13 @@ from math import degrees
 
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.firmware_gains import axis_lines, gains_of, rate_gain_of
-from e2efly.flight.betaflight.messages import MotorTelemetry
 from e2efly.flight.betaflight.rates import AXES
-from e2efly.flight.betaflight.row import Row
 from e2efly.flight.betaflight.sticks import CHANNELS
 from e2efly.flight.betaflight.switches import switch_rows, where
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
 from e2efly.flight.betaflight.versions import RELEASES
-from e2efly.flight.pilot.hovering import HOVERS, ROTOR_SPEED, HoverController
 from e2efly.flight.pilot.throttle_map import ThrottleMap
+from e2efly.flight.row import Row
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.contract import Contract
 from e2efly.vehicles.gravity import GRAVITY
@@ -84,25 +82,6 @@ def examine(
     turned = [round(degrees(angle)) for angle in info.alignment.angles]
     rows.append(Row("align_board", f"{turned} deg", "any: attitudes are compared before take-off", True))
     return tuple(rows)
-
-
-def hover_schedule(hover: HoverController) -> dict[int, float]:
-    """The additional messages that a hover controller needs, and how often each is requested, Hz."""
-    return {MotorTelemetry.CODE: SPEED_HZ} if ROTOR_SPEED in hover.needs else {}
-
-
-def check_hover(name: str, hover: HoverController, info: ControllerInfo) -> None:
-    """Refuse a hover controller that needs telemetry that the flight controller does not report.
-
-    Raises:
-        ValueError: telemetry is missing. The message names it, and what is accepted.
-    """
-    if ROTOR_SPEED in hover.needs and not info.motor.tells_speed:
-        able = ", ".join(known for known, kind in HOVERS.items() if ROTOR_SPEED not in kind.needs)
-        raise ValueError(
-            f"--hover is {name!r}, which needs the speeds of the rotors, and this flight controller measures none; "
-            f"accepted: `set dshot_bidir = ON` where its ESCs can, or {able}"
-        )
 
 
 def _rates(info: ControllerInfo, vehicle: Vehicle, contract: Contract | None) -> list[Row]:

@@ -13,8 +13,8 @@ from e2efly.flight.betaflight.allowed_modes import ANGLE, ARM, OVERRIDE, harmles
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.mode_slots import ModeRange
 from e2efly.flight.betaflight.msp_names import BOXES
-from e2efly.flight.betaflight.row import Row
 from e2efly.flight.betaflight.sticks import RATES_PULSE, angle_range
+from e2efly.flight.row import Row
 from e2efly.flight.settings import FlightSettings
 
 SLOTS, AUX_CHANNELS = 20, 14

@@ -26,8 +26,6 @@ from typing import Any
 from e2efly.flight.attitude import Attitude
 from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.descent import Descent, Sense, between, command, feel, move, sent
-from e2efly.flight.betaflight.lifeline import Lifeline, watch
-from e2efly.flight.betaflight.link import MOST, Link, open_link
 from e2efly.flight.betaflight.messages import (
     CHANNEL_RANGE,
     MAX_CHANNELS,
@@ -37,6 +35,8 @@ from e2efly.flight.betaflight.messages import (
     StatusEx,
     set_raw_rc,
 )
+from e2efly.flight.lifeline import Lifeline, watch
+from e2efly.flight.link import MOST, Link, open_link
 from e2efly.vehicles.gravity import GRAVITY
 
 TIMEOUT_S = 0.1

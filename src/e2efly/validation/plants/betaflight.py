@@ -69,7 +69,7 @@ class BetaflightPlant(Plant):
 
     @property
     def _sticks(self) -> Sticks:
-        return self._bridge.sticks
+        return self._session.autopilot.sticks
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
         """Put another body under the firmware. Throttle map and settings stay those of the vehicle that took off.
@@ -130,6 +130,7 @@ class BetaflightPlant(Plant):
 
     def _frame(self, channels: tuple[int, ...], dt: float) -> None:
         now = self._rig.now()
-        self._session.client.poll(now)
-        self._session.client.set_raw_rc(set_raw_rc(channels), now)
+        client = self._session.autopilot.client
+        client.poll(now)
+        client.set_raw_rc(set_raw_rc(channels), now)
         self._rig.sleep(dt)

@@ -1,0 +1,57 @@
+"""Opens the autopilot that the text of a link names."""
+
+import time
+
+from e2efly.flight.autopilot import Autopilot
+from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, check_hover
+from e2efly.flight.betaflight.client import SCHEDULE
+from e2efly.flight.betaflight.descent_plan import DescentWatchdog
+from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.flight_loop import Watchdog
+from e2efly.flight.link import Link, open_link
+from e2efly.flight.pilot.hovering import HoverController
+from e2efly.flight.settings import FlightSettings
+
+CONNECT_S = 5.0
+"""How long an autopilot may take to send its first answer, s."""
+
+
+def open_autopilot(
+    target: str, settings: FlightSettings, hover: tuple[str, HoverController], *, watched: bool, excited: bool
+) -> tuple[Autopilot, Watchdog | None]:
+    """Connect to an autopilot, and identify it. `close` of the autopilot closes the link.
+
+    Args:
+        target: the text of the link.
+        settings: the limits of the flight, with the pilot's channels.
+        hover: name of the hover controller, and the controller, which may need more telemetry.
+        watched: a watchdog holds the link, where the autopilot does not land by itself when commands end.
+        excited: the flight is one of identification, which needs more measurements.
+
+    Returns:
+        The autopilot, and its watchdog, if it has one.
+
+    Raises:
+        ValueError: the text is not valid, or the autopilot is none that can be flown.
+        OSError: the link does not connect.
+        TimeoutError: nothing answers.
+    """
+    held: Link = WatchedLink(target) if watched else open_link(target)
+    try:
+        _connect(held, target)
+        schedule = EXCITATION_SCHEDULE if excited else SCHEDULE
+        autopilot = Betaflight.connect(held, settings, schedule, hover=hover[1], timeout=CONNECT_S)
+        check_hover(*hover, autopilot.info)
+    except BaseException:
+        held.close()
+        raise
+    return autopilot, DescentWatchdog(held, autopilot) if isinstance(held, WatchedLink) else None
+
+
+def _connect(link: Link, target: str) -> None:
+    end = time.monotonic() + CONNECT_S
+    while not link.alive and time.monotonic() < end:
+        link.poll(time.monotonic())
+        time.sleep(0.01)
+    if not link.alive:
+        raise OSError(f"--link {target}: {link.reason}")
