@@ -200,7 +200,7 @@ def in_firmware(rig: Rig, name: str, case: Case, vehicle: Vehicle) -> dict[str, 
     settings = dataclasses.replace(rehearsal_settings(HEIGHT), follow_distance=50.0)
     link = open_link(rig.sitl.msp)
     link = SpeedLink(link, rig) if name == "indi" else link
-    session = Session(rig, settings, hover=along, link=link)  # type: ignore[arg-type]
+    session = Session(rig, settings, hover=along, autopilot=rig.autopilot(settings, along, link=link))
     try:
         rig.carry(dataclasses.replace(vehicle, mass=vehicle.mass * case.mass))
         settle = 3.0 if case.mass == 1 else 0.0

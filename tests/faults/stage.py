@@ -133,7 +133,8 @@ class Stage:
         try:
             session = Session(
                 self.rig, self.settings, policy=None if gear.commands else self._policy, course=self._course,
-                link=link, source=self.poses, cameras=self.cameras, commands=self._commander, filtered=gear.filtered,
+                autopilot=self.rig.autopilot(self.settings, link=link), source=self.poses,
+                cameras=self.cameras, commands=self._commander, filtered=gear.filtered,
                 vehicle=gear.believed, log=self.log,
             )  # fmt: skip
         except (ValueError, OSError):

@@ -96,7 +96,7 @@ def fly_excited(
 
             session = Session(
                 rig, settings, policy=acts, course=course, log=log, source=PlantSource(poses, "rig"),
-                schedule=EXCITATION_SCHEDULE,
+                autopilot=rig.autopilot(settings, schedule=EXCITATION_SCHEDULE),
             )  # fmt: skip
             rig.carry(body)
             try:

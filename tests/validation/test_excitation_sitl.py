@@ -77,7 +77,8 @@ def test_the_pilots_switch_ends_it_at_once(tmp_path: Path) -> None:
     acts, course = excitation(FILE, SETTINGS, SHORT)
     with Rig(firmware_program.chosen(), tmp_path, FILE, latency=0.03) as rig:
         rig.sleep(0.5)
-        session = Session(rig, SETTINGS, policy=acts, course=course, schedule=EXCITATION_SCHEDULE)
+        autopilot = rig.autopilot(SETTINGS, schedule=EXCITATION_SCHEDULE)
+        session = Session(rig, SETTINGS, policy=acts, course=course, autopilot=autopilot)
         try:
             assert session.take_off(1.0)
             rig.set(mission="policy")

@@ -40,10 +40,9 @@ def error(flown: FlownSession, last: float) -> float:
 def test_it_takes_off_holds_its_place_in_wind_and_lands(rig: Rig, name: str) -> None:
     rig.state, rig.wind = rig.world.at_rest(), np.zeros(3)
     link = open_link(rig.sitl.msp)
-    session = Session(
-        rig, rehearsal_settings(1.5), hover=hover_controller(name, VEHICLE, LATENCY + 0.01),
-        link=SpeedLink(link, rig) if name == "indi" else link,
-    )  # fmt: skip
+    settings, hover = rehearsal_settings(1.5), hover_controller(name, VEHICLE, LATENCY + 0.01)
+    autopilot = rig.autopilot(settings, hover, link=SpeedLink(link, rig) if name == "indi" else link)
+    session = Session(rig, settings, hover=hover, autopilot=autopilot)
     try:
         assert session.take_off(3.0), session.bridge.flight.reasons
         assert error(session.flown, 1.0) < 0.06

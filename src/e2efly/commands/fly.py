@@ -14,14 +14,13 @@ from e2efly.commands.fly_check import look, print_settings, refuse_in_flight
 from e2efly.commands.fly_meta import record_meta
 from e2efly.commands.options import parse as parse_options
 from e2efly.commands.terminal import Terminal
-from e2efly.flight.autopilots import open_autopilot
+from e2efly.flight.autopilots import check_link, open_autopilot
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.commander.sources import open_commands
 from e2efly.flight.excitation import NAMES, ExcitationOptions, StepsOptions, excitation
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, Timing, fly, loop_rate
-from e2efly.flight.link import open_link
 from e2efly.flight.log_record import Logs
 from e2efly.flight.operator import Speaker, Stop
 from e2efly.flight.pilot import throttle_map
@@ -57,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly a Betaflight quadrotor. The pilot's switches decide. See docs/flying.md before the first flight."""
+    """Fly a quadrotor with Betaflight, PX4 or ArduCopter. The pilot's switches decide. See docs/flying.md first."""
 
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
     """A policy.onnx, a run directory, or a task (the zoo's policy). In place of a policy, `excitation` flies the
@@ -65,7 +64,8 @@ class Fly:
     landing only.
     `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
-    """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT."""
+    """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT (Betaflight).
+    mavlink:udp:HOST:PORT, mavlink:udpout:HOST:PORT or mavlink:/dev/ttyACM0: PX4 or ArduCopter. See docs/mavlink.md."""
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
     path/to/file.py:Name[:...]."""
@@ -255,7 +255,7 @@ def run(options: Fly) -> int:
     body, hover, contract = plan.body, plan.hover, plan.contract
     targets = targets_of(options.live)
     cameras = [] if plan.loaded is None else open_cameras(options.image, plan.loaded.contract)
-    open_link(options.link).close()  # a wrong text is refused here rather than by the watchdog
+    check_link(options.link)  # a wrong text is refused here rather than by the watchdog
     with ExitStack() as stack:
         for camera in cameras:
             stack.callback(camera.close)

@@ -25,7 +25,7 @@ class InertialReading:
     """A measurement of the inertial sensors."""
 
     acceleration: tuple[float, float, float]
-    """Specific force. In any unit: gravity at rest gives the scale."""
+    """Specific force, in any unit in which gravity at rest, from which the scale is known, is 200 to 9000."""
     body_rate: tuple[float, float, float]
     """rad/s."""
     asked: float
@@ -71,6 +71,20 @@ class Outgoing:
     """Pulse widths of stick channels, us. Empty: it takes no sticks."""
     saturated: tuple[str, ...] = ()
     """The parts of the command that it cannot follow."""
+
+
+def arrived(acknowledged: Sequence[float], start: float, end: float, hole: float = HOLE) -> bool:
+    """Whether all commands sent from `start` to `end`, s, are known to have arrived.
+
+    `acknowledged` are the times, s, oldest first, at which commands were sent that have arrived. Between two of them
+    that are more than `hole` s apart, others may not have.
+    """
+    later = end
+    for time in reversed(acknowledged):
+        if time < later - hole or time <= start:
+            break
+        later = min(later, time)
+    return later - start <= hole
 
 
 class Autopilot(Protocol):

@@ -9,9 +9,12 @@ from e2efly.flight.betaflight.descent_plan import DescentWatchdog
 from e2efly.flight.betaflight.watchdog import WatchedLink
 from e2efly.flight.flight_loop import Watchdog
 from e2efly.flight.link import Link, open_link
-from e2efly.flight.pilot.hovering import HoverController
+from e2efly.flight.mavlink.mavlink import Mavlink
+from e2efly.flight.pilot.hovering import ROTOR_SPEED, HoverController
 from e2efly.flight.settings import FlightSettings
 
+MAVLINK = "mavlink:"
+"""Begins the text of a link to an autopilot that speaks MAVLink."""
 CONNECT_S = 5.0
 """How long an autopilot may take to send its first answer, s."""
 
@@ -36,6 +39,8 @@ def open_autopilot(
         OSError: the link does not connect.
         TimeoutError: nothing answers.
     """
+    if target.startswith(MAVLINK):
+        return _mavlink(target, settings, hover), None
     held: Link = WatchedLink(target) if watched else open_link(target)
     try:
         _connect(held, target)
@@ -46,6 +51,34 @@ def open_autopilot(
         held.close()
         raise
     return autopilot, DescentWatchdog(held, autopilot) if isinstance(held, WatchedLink) else None
+
+
+def check_link(target: str) -> None:
+    """Refuse a text that names no link.
+
+    Raises:
+        ValueError: the message names it and what is accepted.
+    """
+    open_link(target.removeprefix(MAVLINK)).close()
+
+
+def _mavlink(target: str, settings: FlightSettings, hover: tuple[str, HoverController]) -> Autopilot:
+    """PX4 or ArduCopter. It lands by itself when commands end: nothing may go on sending in this program's place."""
+    held = open_link(target.removeprefix(MAVLINK))
+    try:
+        _connect(held, target)
+        autopilot = Mavlink.connect(held, settings, CONNECT_S)
+        if ROTOR_SPEED in hover[1].needs:
+            autopilot.poll(time.monotonic())
+            if autopilot.rotor_speeds(time.monotonic(), CONNECT_S) is None:
+                raise ValueError(
+                    f"--hover is {hover[0]!r}, which needs the speeds of the rotors, and no ESC_TELEMETRY_1_TO_4 "
+                    "comes; accepted: geometric, mpc or pid, or ESCs that tell their speed"
+                )
+    except BaseException:
+        held.close()
+        raise
+    return autopilot
 
 
 def _connect(link: Link, target: str) -> None:

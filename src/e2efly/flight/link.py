@@ -1,4 +1,4 @@
-"""Links that carry bytes to a controller and back, over a serial port or TCP. Nothing here blocks or raises in flight.
+"""Links that carry bytes to a controller and back: serial ports, TCP, UDP. Nothing here blocks or raises in flight.
 
 `poll` connects, and connects again after a failure. `send` and `receive` work while the link is alive, and do nothing
 otherwise. `reason` says why the link is not alive.
@@ -25,7 +25,9 @@ MOST = 4096
 """The largest number of received bytes that are decoded in a control step. If there are more, only the newest are
 decoded, because there is no time for all."""
 _CHUNK = 65536
-_ACCEPTED = "serial:/dev/ttyACM0?baud=115200, /dev/ttyACM0 or tcp:HOST:PORT"
+_DATAGRAM = 1400
+"""Largest datagram, bytes: what one frame of Ethernet holds."""
+_ACCEPTED = "serial:/dev/ttyACM0?baud=115200, /dev/ttyACM0, tcp:HOST:PORT, udp:HOST:PORT or udpout:HOST:PORT"
 
 
 class Link(Protocol):
@@ -162,7 +164,8 @@ class StreamLink:
 
 
 def open_link(target: str) -> StreamLink:
-    """A link from its text: `serial:/dev/ttyACM0?baud=115200`, `/dev/ttyACM0` or `tcp:HOST:PORT`.
+    """A link from its text: `serial:/dev/ttyACM0?baud=115200`, `/dev/ttyACM0`, `tcp:HOST:PORT`, `udp:HOST:PORT` (an
+    address of this machine, to which the controller sends) or `udpout:HOST:PORT` (the controller's address).
 
     It connects when it is first polled.
 
@@ -180,13 +183,18 @@ def open_link(target: str) -> StreamLink:
             raise ValueError(f"link {target!r}; accepted: {_ACCEPTED}")
         return StreamLink(target, lambda: _SerialPort(path, int(baud)))
     host, _, port = rest.rpartition(":")
-    if kind != "tcp" or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+    if kind not in _TYPES or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise ValueError(f"link {target!r}; accepted: {_ACCEPTED}")
     try:
-        family, _, _, _, address = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)[0]
+        family, _, _, _, address = socket.getaddrinfo(host.strip("[]"), int(port), type=_TYPES[kind])[0]
     except (OSError, UnicodeError) as error:
         raise ValueError(f"link {target!r}: no such host ({error}); accepted: {_ACCEPTED}") from None
-    return StreamLink(target, lambda: _TcpPort(family, address))
+    if kind == "tcp":
+        return StreamLink(target, lambda: _TcpPort(family, address))
+    return StreamLink(target, lambda: _UdpPort(family, address, listens=kind == "udp"))
+
+
+_TYPES = {"tcp": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM, "udpout": socket.SOCK_DGRAM}
 
 
 def _events(descriptor: int, kind: int) -> bool:
@@ -260,6 +268,46 @@ class _TcpPort:
     def write(self, data: bytes) -> int:
         try:
             return self._socket.send(data)
+        except BlockingIOError:
+            return 0
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _UdpPort:
+    """Datagrams of one peer: of the given one, or of the first that sends."""
+
+    def __init__(self, family: int, address: Any, *, listens: bool) -> None:
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            self._socket.setblocking(False)
+            if listens:
+                self._socket.bind(address)
+            else:
+                self._socket.connect(address)
+        except OSError:
+            self._socket.close()
+            raise
+        self._connected = not listens
+
+    def connected(self) -> bool:
+        if not self._connected and _events(self._socket.fileno(), select.POLLIN):
+            _, peer = self._socket.recvfrom(0, socket.MSG_PEEK)
+            self._socket.connect(peer)  # from now on, the system drops what others send
+            self._connected = True
+        return self._connected
+
+    def read(self) -> bytes:
+        data = bytearray()
+        with suppress(BlockingIOError):
+            while len(data) < _CHUNK:
+                data += self._socket.recv(_CHUNK)
+        return bytes(data)
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self._socket.send(data[:_DATAGRAM])
         except BlockingIOError:
             return 0
 

@@ -1,19 +1,17 @@
 """The bridge flying the firmware on a rig, in one process and in virtual time: the pilot is a script."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from e2efly.flight.betaflight.autopilot import Betaflight
-from e2efly.flight.betaflight.client import SCHEDULE
+from e2efly.flight.autopilot import Autopilot
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander, CommandSource
 from e2efly.flight.filter.filter import Filter, fastest
 from e2efly.flight.flight_loop import LOWEST_RATE, loop_rate
-from e2efly.flight.link import Link, open_link
 from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController
@@ -22,9 +20,10 @@ from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course
+from e2efly.policy.odometry import Sample
 from e2efly.policy.runtime import Acting, Envelope, Runtime
 from e2efly.policy.worker import PolicyWorker
-from e2efly.validation.rig import Rig
+from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -32,6 +31,38 @@ REACH = 20.0
 """Usual size of the fence about the origin, m."""
 PATIENCE_S = 60.0
 """Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
+
+
+class Bench(Protocol):
+    """A vehicle in its world under an autopilot, with a pilot and poses. Sleeping on it lets time pass."""
+
+    state: FlownBody
+    latency: float
+
+    @property
+    def world(self) -> World:
+        """The rigid body."""
+        ...
+
+    def now(self) -> float:
+        """Time, s."""
+        ...
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass, s."""
+        ...
+
+    def poses(self, now: float) -> list[Sample]:
+        """The poses that have come since the last call."""
+        ...
+
+    def set(self, **changes: Any) -> None:
+        """Move the pilot's sticks and switches: fields of `rig.Transmitter`."""
+        ...
+
+    def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Autopilot:
+        """The autopilot, identified, for a bridge with these settings."""
+        ...
 
 
 @dataclass
@@ -58,31 +89,28 @@ class Session:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: Bench,
         settings: FlightSettings,
         *,
         policy: Acting | None = None,
         course: Course | None = None,
         log: Log | None = None,
-        link: Link | None = None,
+        autopilot: Autopilot | None = None,
         source: Any = None,
         cameras: Sequence[ImageSource] = (),
         commands: CommandSource | None = None,
-        schedule: Mapping[int, float] = SCHEDULE,
         filtered: bool = False,
         hover: HoverController | None = None,
         vehicle: Vehicle | None = None,
         neighbours: Neighbours | None = None,
     ) -> None:
-        """Identify the controller, and put a bridge on its link.
+        """Put a bridge on an autopilot. Without one, the rig's firmware is identified.
 
         `vehicle` is the vehicle that the bridge is told of. None: the vehicle that flies.
         """
         vehicle = vehicle or rig.world.vehicle
         self.rig, self.settings = rig, settings
-        self.autopilot = Betaflight.connect(
-            link or open_link(rig.sitl.msp), settings, schedule, hover=hover, timeout=3.0, clock=rig
-        )
+        self.autopilot: Any = autopilot or rig.autopilot(settings, hover)
         self.worker: PolicyWorker | None = None
         rate = LOWEST_RATE
         if policy is not None and course is not None:
@@ -145,6 +173,8 @@ class Session:
         self.fly(0.3)
         self.rig.set(armed=True)
         self.fly(0.5)
+        if not self.bridge.inputs.override:  # PX4 follows only after a second of commands
+            self.fly(2.0, lambda: self.bridge.inputs.override)
         self.rig.set(mission="hover")
         height = self.settings.takeoff_height / self.settings.takeoff_speed
         return self.fly(height + 8.0, self.in_mode(Mode.HOVER)) and not self.fly(settle, self.in_mode(Mode.LAND))
@@ -162,7 +192,7 @@ class Session:
         return None if place is None else np.array(place)
 
 
-def run(rig: Rig, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
+def run(rig: Bench, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
     """Run steps for `seconds` of the rig's time, or until a condition holds. Returns whether it holds."""
     end = rig.now() + seconds
     while rig.now() < end:

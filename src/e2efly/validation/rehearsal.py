@@ -18,7 +18,7 @@ from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.runtime import Acting, RuntimeState
 from e2efly.tasks.route import Route, course_for, route_of, usual_route
-from e2efly.validation.bridge_session import REACH, FlownSession, Session, open_fence, rehearsal_settings
+from e2efly.validation.bridge_session import REACH, Bench, FlownSession, Session, open_fence, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
@@ -107,7 +107,7 @@ def rehearse(
         latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
         with Rig(firmware, Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
-            flight = _fly(rig, policy, course, seed, log, [wrap(source) for source in sources], fence)
+            flight = whole_flight(rig, policy, course, seed, log, [wrap(source) for source in sources], fence)
     return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
 
 
@@ -122,10 +122,11 @@ def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) 
     return dataclasses.replace(flight, success=False, told=told)
 
 
-def _fly(
-    rig: Rig, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
+def whole_flight(
+    rig: Bench, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
     fence: Fence | None,
 ) -> Rehearsal:  # fmt: skip
+    """One whole flight on a bench, from the ground to the ground; see `rehearse`. The latency is the bench's."""
     random = np.random.default_rng(seed)
     first = course.origin.points(course.start)
     x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)

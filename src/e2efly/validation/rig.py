@@ -9,17 +9,23 @@ import shutil
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from e2efly.flight.betaflight.autopilot import Betaflight
+from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.firmware_gains import gain_lines, gains_of
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
 from e2efly.flight.betaflight.versions import Release
+from e2efly.flight.link import Link, open_link
+from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.pilot.throttle_map import ThrottleMap
+from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Sample
 from e2efly.simulation.device import compute_at_once, one_core
 from e2efly.validation.firmware_program import Firmware
@@ -267,9 +273,22 @@ class Rig:
             ready.append(dataclasses.replace(sample, received=now))
         return ready
 
-    def set(self, **changes: object) -> None:
+    def autopilot(
+        self,
+        settings: FlightSettings,
+        hover: HoverController | None = None,
+        *,
+        link: Link | None = None,
+        schedule: Mapping[int, float] = SCHEDULE,
+    ) -> Betaflight:
+        """The firmware as a bridge's autopilot. Without a link, over its own port."""
+        return Betaflight.connect(
+            link or open_link(self.sitl.msp), settings, schedule, hover=hover, timeout=3.0, clock=self
+        )
+
+    def set(self, **changes: Any) -> None:
         """Move the pilot's sticks and switches: fields of `Transmitter`."""
-        self.transmitter = dataclasses.replace(self.transmitter, **changes)  # type: ignore[arg-type]
+        self.transmitter = dataclasses.replace(self.transmitter, **changes)
 
     def power(self, on: bool) -> None:
         """Cut the controller's power, which stops the motors, or restore it, which boots the controller."""

@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from e2efly.flight.autopilot import HOLE
+from e2efly.flight.autopilot import HOLE, arrived
 from e2efly.flight.betaflight import messages, mode_slots, settings_messages
 from e2efly.flight.betaflight.codec import ERROR, REQUEST, Decoder, MspFrame, encode
 from e2efly.flight.clock import MONOTONIC, Clock
@@ -163,12 +163,7 @@ class Client:
 
     def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
         """Whether the stick frames sent from `start` to `end`, s, are known to have arrived, `hole` s at most apart."""
-        later = end
-        for time in reversed(self.acknowledged):
-            if time < later - hole or time <= start:
-                break
-            later = min(later, time)
-        return later - start <= hole
+        return arrived(self.acknowledged, start, end, hole)
 
     def lossy(self, now: float) -> bool:
         """Whether the line loses replies, so that `latency` may be counted from a request whose reply was lost."""

@@ -15,8 +15,9 @@ from e2efly.flight.betaflight.client import Client
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.messages import AttitudeReply, BatteryState, Rc, StatusEx
 from e2efly.flight.betaflight.sticks import RATES_PULSE, Sticks
+from e2efly.flight.pilot.channels import mission_of, pilot_of
 from e2efly.flight.pilot.flight_state import Mission, Pilot
-from e2efly.flight.settings import FlightSettings, PilotChannels
+from e2efly.flight.settings import FlightSettings
 
 RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})
 """Reasons against arming with which the controller reports that it does not hear the pilot."""
@@ -146,7 +147,7 @@ class Instruments:
     def _pilot(self, channels: Rc | None, *, fresh: bool, land: bool) -> Pilot | None:
         if channels is None:
             return None
-        at = mission_of(channels, self.settings.channels)
+        at = mission_of(channels.channels, self.settings.channels)
         if fresh:
             self._mission.hear(at)
         mission = self._mission.held
@@ -154,7 +155,7 @@ class Instruments:
             return None
         if mission is Mission.POLICY and at is not Mission.POLICY:
             mission = Mission.HOVER  # the policy stops at once; the next message shows whether to land
-        return pilot_of(channels, self.settings.channels, Mission.LAND if land else mission)
+        return pilot_of(channels.channels, self.settings.channels, Mission.LAND if land else mission)
 
     def _fresh(self) -> dict[int, Any]:
         fresh = {}
@@ -182,25 +183,6 @@ class Instruments:
             return
         cell = battery.voltage / battery.cells
         self._voltage = cell if self._voltage is None else self._voltage + VOLTAGE_SHARE * (cell - self._voltage)
-
-
-def mission_of(rc: Rc, places: PilotChannels) -> Mission | None:
-    """The position of the mission switch. None: the receiver has no such channel, so the pilot's wish is unknown."""
-    if places.mission > len(rc.channels):
-        return None
-    at = rc.channels[places.mission - 1]
-    return Mission.LAND if at < 1300 else Mission.POLICY if at > 1700 else Mission.HOVER
-
-
-def pilot_of(rc: Rc, places: PilotChannels, mission: Mission) -> Pilot:
-    """What the pilot wants. `places` has the channels with the copies of the sticks."""
-
-    def stick(channel: int | None) -> float:
-        if channel is None or channel > len(rc.channels):
-            return 0.0
-        return max(-1.0, min(1.0, (rc.channels[channel - 1] - 1500) / 500))
-
-    return Pilot(mission, stick(places.roll), stick(places.pitch), stick(places.throttle), stick(places.yaw))
 
 
 PROBE = (20, 40, 60)

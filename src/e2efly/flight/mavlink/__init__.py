@@ -1,0 +1,1 @@
+"""Autopilots that speak MAVLink 2: PX4 and ArduPilot."""
