@@ -135,7 +135,7 @@ class MavlinkRig:
         self.mav = mav.MAVLink(None, srcSystem=1, srcComponent=1)
         self.reader = mav.MAVLink(None)
         self.mode = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
-        self.armed = self.critical = self.received = False
+        self.armed = self.critical = self.received = self._arm = False
         self.log: list[str] = []
         """What it did, in order: modes, arming, failsafes."""
         self.poses_seen = 0
@@ -236,9 +236,11 @@ class MavlinkRig:
         mine = OFFBOARD if self.px4 else GUIDED_NOGPS
         land = PX4_LAND if self.px4 else COPTER_LAND
         manual = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
-        if received and self.hand.armed is not self.armed and (self.hand.armed or self._standing):
-            self.armed = self.hand.armed
-            self.log.append("armed" if self.armed else "disarmed")
+        if received and self.hand.armed is not self._arm and (self.hand.armed or self._standing):  # moved, not held
+            self._arm = self.hand.armed
+            if self.armed is not self._arm:
+                self.armed = self._arm
+                self.log.append("armed" if self.armed else "disarmed")
         if received and self.hand.override is not self.received:
             if not self.hand.override:
                 self._to(manual, critical=False)

@@ -544,6 +544,9 @@ def test_poses_that_contradict_the_sensors_count_as_lost() -> None:
         assert flown(flight, UP, 2.0).blind  # until it has landed
     low = having(wrong, pilot=LAND, odometry=at(0.05 + NEAR_GROUND / 2))
     assert not flown(landing(), low).blind  # that is the shock of the ground
+    touches = having(low, pilot=POLICY, policy_lands=True)
+    assert flown(policy_flying(), touches).mode is Mode.POLICY  # and so it is where a policy lands
+    assert flown(policy_flying(), having(touches, policy_lands=False)).blind
     assert flown(flown(with_pilot(), having(wrong, override=False)), UP).blind
 
 

@@ -329,13 +329,18 @@ class Mavlink:
         self._voltage = volts / cells if cells else None
 
     def _inertial(self) -> InertialReading | None:
-        """A new measurement of the inertial sensors, its force in thousandths of gravity."""
-        for name, force, turn in (("HIGHRES_IMU", 1000 / GRAVITY, 1.0), ("RAW_IMU", 1.0, 1e-3)):
-            found = self.station.latest.get(name)
-            if found is not None and found[1] > self._felt:
+        """A new measurement of the inertial sensors, its force in thousandths of gravity.
+
+        The body rates are those beside the attitude: RAW_IMU has them in whole mrad/s, too coarse for a calm flight.
+        """
+        latest = self.station.latest
+        turned = latest.get("ATTITUDE_QUATERNION")
+        for name, force in (("HIGHRES_IMU", 1000 / GRAVITY), ("RAW_IMU", 1.0)):
+            found = latest.get(name)
+            if found is not None and turned is not None and found[1] > self._felt:
                 told, self._felt = found
                 x, y, z = (force * told[f"{axis}acc"] for axis in "xyz")
-                p, q, r = (turn * told[f"{axis}gyro"] for axis in "xyz")
+                p, q, r = (turned[0][f"{axis}speed"] for axis in ("roll", "pitch", "yaw"))
                 return InertialReading((x, -y, -z), (p, -q, -r), found[1] - self._late, found[1])
         return None
 

@@ -58,7 +58,7 @@ class Reason(StrEnum):
     NO_PILOT = "the pilot's receiver is not heard"
     MISSION_NOT_LOW = "the mission switch must be low first"
     NOT_ARMED = "not armed"
-    NO_OVERRIDE = "MSP override is off"
+    NO_OVERRIDE = "the autopilot does not take commands"
     SETTINGS = "settings"
     LINK = "no link to the flight controller"
     ATTITUDE = "the controller's attitude is unlike the odometry's"

@@ -40,7 +40,8 @@ FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
 """A vehicle has fallen if it is tilted by more than the first value, rad, and slower than the second, m/s, for the time
 of the third, s. In the air, gravity alone would have made it faster."""
 NEAR_GROUND = 0.3
-"""In a landing below this height, m, poses and sensors may differ, because the shock of the ground can cause this."""
+"""In a landing, a policy's too, below this height, m, poses and sensors may differ: the shock of the ground can cause
+this."""
 
 
 def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -> Flight:
@@ -87,7 +88,7 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     """
     if flight.mode in (Mode.INIT, Mode.DONE):
         return dataclasses.replace(flight, misled=None, turned=None, fallen_since=None)
-    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, inputs.odometry):
+    if inputs.motion_problem and not flight.misled and not _nearly_landed(flight, inputs):
         flight = dataclasses.replace(flight, misled=f"{Reason.MOTION}: {inputs.motion_problem}")
     odometry, target = inputs.seen, flight.target
     if odometry is None:
@@ -114,8 +115,10 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     return dataclasses.replace(flight, nearest=nearest, misled=misled)
 
 
-def _nearly_landed(flight: Flight, odometry: Odometry | None) -> bool:
-    if flight.mode is not Mode.LAND or flight.blind or odometry is None:
+def _nearly_landed(flight: Flight, inputs: Inputs) -> bool:
+    odometry = inputs.odometry
+    lands = flight.mode is Mode.LAND or (flight.mode is Mode.POLICY and inputs.policy_lands)
+    if not lands or flight.blind or odometry is None:
         return False
     return abs(float(odometry.position[2]) - flight.home) < NEAR_GROUND
 
