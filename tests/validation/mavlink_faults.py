@@ -7,10 +7,8 @@ import numpy as np
 
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.validation.bridge_session import Session
+from tests.faults.fault_run import TOUCH_SPEED
 from tests.flight.mavlink_peer import MavlinkRig
-
-FASTEST_TOUCH = 1.0
-"""Vertical speed at which a landing still counts as one, m/s."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ def flown(rig: MavlinkRig, session: Session, fault: Fault) -> FaultEnd:
     good = (
         acted is fault.autopilot_acts
         and down is not fault.flies
-        and fastest < FASTEST_TOUCH
+        and fastest < TOUCH_SPEED
         and tilt > 0.9
         and (not alive or mode in fault.ends)
     )

@@ -41,8 +41,6 @@ class Station:
     """When the newest message came, s."""
     statuses: int = 0
     """Number of the autopilot's heartbeats so far."""
-    round_trip: float = 0.0
-    """How long the newest echo took, s."""
     quickest: float = math.inf
     """How long the quickest echo on this connection took, s."""
     said: list[str] = field(default_factory=list)
@@ -51,6 +49,7 @@ class Station:
     replies: int = 0
     reader: FrameReader = field(default_factory=FrameReader)
     _echoed: deque[float] = field(default_factory=lambda: deque(maxlen=512))
+    _trips: deque[float] = field(default_factory=lambda: deque(maxlen=5))
     _sequence: int = 0
     _connection: int = 0
     _beat: float = -math.inf
@@ -63,6 +62,7 @@ class Station:
             self._connection, self.quickest = self.link.connections, math.inf
             self.latest.clear()
             self._echoed.clear()
+            self._trips.clear()
         for message in self.reader.feed(self.link.receive()[-MOST:]):
             self._take(message, now)
         if now - self._beat >= HEARTBEAT_S:
@@ -85,6 +85,13 @@ class Station:
     def command(self, number: int, *params: float) -> None:
         """Send a command with its parameters."""
         self.send("COMMAND_LONG", {"command": number, "params": (*params, *(0.0,) * (7 - len(params)))})
+
+    @property
+    def round_trip(self) -> float:
+        """How long the quickest of the newest echoes took, s. One that is read late, because this program was held
+        up, says nothing of the link.
+        """
+        return min(self._trips, default=0.0)
 
     def newest(self, name: str, now: float, oldest: float) -> tuple[dict[str, Any], float] | None:
         """The newest message of a kind, and when it came, s. None: that is more than `oldest` s ago."""
@@ -113,8 +120,8 @@ class Station:
             sent = told["ts1"] / 1e9
             if 0 <= now - sent < 1.0:
                 self.replies += 1
-                self.round_trip = now - sent
-                self.quickest = min(self.quickest, self.round_trip)
+                self._trips.append(now - sent)
+                self.quickest = min(self.quickest, now - sent)
                 self._echoed.append(sent)
         elif message.name == "PARAM_VALUE":
             self.parameters[_text(told["param_id"])] = told["param_value"], told["param_type"]
