@@ -2,16 +2,19 @@
 
 import contextlib
 import dataclasses
+import functools
 import socket
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from e2efly.commands.fly import Fly
 from e2efly.commands.fly import run as fly_command
+from e2efly.flight.autopilots import open_autopilot
 from e2efly.flight.link import open_link
 from e2efly.flight.mavlink.dialect import ARDUPILOT, PX4, Dialect, dialect_of, release_row
 from e2efly.flight.mavlink.mavlink import Mavlink
@@ -182,3 +185,34 @@ def test_a_datagram_port_hears_the_first_that_sends_alone() -> None:
         link.send(b"back")
         assert first.recv(100) == b"back"
     link.close()
+
+
+OWN = """
+from e2efly.flight.mavlink.mavlink import Mavlink
+from e2efly.flight.mavlink.station import Station
+from tests.validation.test_mavlink import bench
+
+
+class Own(Mavlink):
+    def __init__(self, text, settings):
+        super().__init__(Station(bench().wire), settings, bench())
+
+
+class Half:
+    def __init__(self, text, settings):
+        self.text = text
+"""
+
+
+@functools.cache
+def bench() -> MavlinkRig:
+    return MavlinkRig("px4", VEHICLE)
+
+
+def test_an_autopilot_of_ones_own_is_a_reference_to_a_file(tmp_path: Path) -> None:
+    file, hover = tmp_path / "own.py", ("geometric", hover_controller("geometric", VEHICLE, 0.03))
+    file.write_text(OWN)
+    own, watchdog = open_autopilot(f"{file}:Own:text", SETTINGS, hover, watched=True, excited=False)
+    assert watchdog is None and own.versions["firmware"] == "PX4 1.15.4"
+    with pytest.raises(ValueError, match=r"Half has no versions, .* accepted: all of versions"):
+        open_autopilot(f"{file}:Half", SETTINGS, hover, watched=True, excited=False)

@@ -65,7 +65,8 @@ class Fly:
     `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT (Betaflight).
-    mavlink:udp:HOST:PORT, mavlink:udpout:HOST:PORT or mavlink:/dev/ttyACM0: PX4 or ArduCopter. See docs/mavlink.md."""
+    mavlink:udp:HOST:PORT, mavlink:udpout:HOST:PORT or mavlink:/dev/ttyACM0: PX4 or ArduCopter. Or your
+    own autopilot, path/to/file.py:Name[:...]. See docs/mavlink.md."""
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
     path/to/file.py:Name[:...]."""

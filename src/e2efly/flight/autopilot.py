@@ -16,6 +16,11 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.vehicle import Vehicle
 
+METHODS = (
+    "versions", "connections", "heard", "statuses", "identify", "check", "poll", "read", "attitude", "rotor_speeds",
+    "send", "pose", "delivered", "uncertain", "link_record", "close",
+)  # fmt: skip
+"""What an autopilot must have."""
 HOLE = 0.1
 """Between two commands that are known to have arrived and are further apart than this, s, others may not have."""
 

@@ -2,7 +2,8 @@
 
 import time
 
-from e2efly.flight.autopilot import Autopilot
+from e2efly.config.registry import check_methods, load, referenced
+from e2efly.flight.autopilot import METHODS, Autopilot
 from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, check_hover
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.descent_plan import DescentWatchdog
@@ -25,7 +26,8 @@ def open_autopilot(
     """Connect to an autopilot, and identify it. `close` of the autopilot closes the link.
 
     Args:
-        target: the text of the link.
+        target: the text of the link; `mavlink:` and a link; or a reference to a class of one's own,
+            path/to/file.py:Name[:...], which is made with the text after it and `settings`, and is an `Autopilot`.
         settings: the limits of the flight, with the pilot's channels.
         hover: name of the hover controller, and the controller, which may need more telemetry.
         watched: a watchdog holds the link, where the autopilot does not land by itself when commands end.
@@ -41,6 +43,11 @@ def open_autopilot(
     """
     if target.startswith(MAVLINK):
         return _mavlink(target, settings, hover), None
+    if (own := referenced(target)) is not None:
+        made = load(own[0])(own[1], settings)
+        check_methods(made, METHODS)
+        made.identify(CONNECT_S)
+        return made, None
     held: Link = WatchedLink(target) if watched else open_link(target)
     try:
         _connect(held, target)
@@ -54,12 +61,15 @@ def open_autopilot(
 
 
 def check_link(target: str) -> None:
-    """Refuse a text that names no link.
+    """Refuse a text that names no link, and no autopilot of one's own.
 
     Raises:
         ValueError: the message names it and what is accepted.
     """
-    open_link(target.removeprefix(MAVLINK)).close()
+    if (own := referenced(target)) is not None:
+        load(own[0])
+    else:
+        open_link(target.removeprefix(MAVLINK)).close()
 
 
 def _mavlink(target: str, settings: FlightSettings, hover: tuple[str, HoverController]) -> Autopilot:

@@ -15,7 +15,7 @@ from e2efly.flight.attitude import Attitude
 from e2efly.flight.autopilot import HOLE, AutopilotState, InertialReading, Outgoing
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.link import Link
-from e2efly.flight.mavlink.dialect import Dialect, dialect_of, release_row
+from e2efly.flight.mavlink.dialect import PX4, Dialect, dialect_of, release_row
 from e2efly.flight.mavlink.station import (
     REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
@@ -60,7 +60,8 @@ class Mavlink:
     def __init__(self, station: Station, settings: FlightSettings, clock: Clock = MONOTONIC) -> None:
         """Fly the autopilot at the other end of a station's link; see `connect`."""
         self.station, self.settings = station, settings
-        self.dialect: Dialect
+        self.dialect: Dialect = PX4
+        """Known once it is identified."""
         self.version = 0, 0, 0
         self.parameters: dict[str, float] = {}
         self._clock, self._now, self._posed = clock, 0.0, -math.inf
