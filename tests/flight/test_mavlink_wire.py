@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from e2efly.flight.mavlink.wire import LAYOUTS, FrameReader, Layout, checksum, encode
+from e2efly.flight.mavlink.wire import LAYOUTS, FrameReader, MessageLayout, checksum, encode
 
 RNG = random.Random(0)
 
 
-def drawn(layout: Layout) -> dict[str, Any]:
+def drawn(layout: MessageLayout) -> dict[str, Any]:
     """Values of every field, some of them zero at the end."""
     values: dict[str, Any] = {}
     for name, kind in layout.fields:
@@ -32,12 +32,12 @@ def _number(kind: str) -> float:
     return RNG.randrange(1 << (bits - (kind.islower())))
 
 
-def theirs(layout: Layout) -> Any:
+def theirs(layout: MessageLayout) -> Any:
     return mav.mavlink_map[layout.id]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
-def test_pymavlink_reads_what_is_written_and_the_other_way_round(layout: Layout) -> None:
+def test_pymavlink_reads_what_is_written_and_the_other_way_round(layout: MessageLayout) -> None:
     values = drawn(layout)
     frame = encode(layout.name, values, sequence=300, system=7, component=191)
     reader = mav.MAVLink(None)

@@ -182,10 +182,14 @@ def test_attempt_without_answer_is_given_up() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "", "udp:1.2.3.4:5", "tcp:127.0.0.1", "tcp::5", "tcp:h:0", "tcp:h:99999", "tcp:h:x", "serial:", "ttyUSB0",
+        "", "tpc:1.2.3.4:5", "udp:h", "tcp:127.0.0.1",
+        "tcp::5", "tcp:h:0", "tcp:h:99999", "tcp:h:x", "serial:", "ttyUSB0",
         "serial:/dev/x?baud=fast", "serial:/dev/x?baud=0", "serial:/dev/x?bauds=9600", "tcp:no.such.host.invalid:5",
     ],
 )  # fmt: skip
 def test_other_texts_are_refused_with_what_is_accepted(text: str) -> None:
-    with pytest.raises(ValueError, match=r"serial:/dev/ttyACM0\?baud=115200, /dev/ttyACM0 or tcp:HOST:PORT"):
+    with pytest.raises(
+        ValueError,
+        match=r"serial:/dev/ttyACM0\?baud=115200, /dev/ttyACM0, tcp:HOST:PORT, udp:HOST:PORT or udpout:HOST:PORT",
+    ):
         open_link(text)

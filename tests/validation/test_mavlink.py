@@ -16,7 +16,7 @@ from e2efly.commands.fly import Fly
 from e2efly.commands.fly import run as fly_command
 from e2efly.flight.autopilots import open_autopilot
 from e2efly.flight.link import open_link
-from e2efly.flight.mavlink.dialect import ARDUPILOT, PX4, Dialect, dialect_of, release_row
+from e2efly.flight.mavlink.dialect import ARDUPILOT, PX4, MavlinkDialect, dialect_of, release_row
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.flight.row import problems
@@ -100,7 +100,9 @@ def test_without_the_failsafe_the_vehicle_would_stay_in_the_air() -> None:
 
 
 @pytest.mark.parametrize(("dialect", "values"), [(PX4, PX4_VALUES), (ARDUPILOT, COPTER_VALUES)])
-def test_each_parameter_that_would_harm_is_named_with_its_line(dialect: Dialect, values: dict[str, float]) -> None:
+def test_each_parameter_that_would_harm_is_named_with_its_line(
+    dialect: MavlinkDialect, values: dict[str, float]
+) -> None:
     assert all(need.row(values).good for need in dialect.needs)
     judged = [need for need in dialect.needs if need.name in WRONG]
     assert len(judged) >= len(dialect.needs) - 1

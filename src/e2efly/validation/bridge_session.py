@@ -33,7 +33,7 @@ PATIENCE_S = 60.0
 """Longest time that a step waits for the policy, s. With virtual time, the load of the machine must not matter."""
 
 
-class Bench(Protocol):
+class FlightBench(Protocol):
     """A vehicle in its world under an autopilot, with a pilot and poses. Sleeping on it lets time pass."""
 
     state: FlownBody
@@ -89,7 +89,7 @@ class Session:
 
     def __init__(
         self,
-        rig: Bench,
+        rig: FlightBench,
         settings: FlightSettings,
         *,
         policy: Acting | None = None,
@@ -192,7 +192,7 @@ class Session:
         return None if place is None else np.array(place)
 
 
-def run(rig: Bench, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
+def run(rig: FlightBench, step: Callable[[], None], seconds: float, until: Callable[[], bool]) -> bool:
     """Run steps for `seconds` of the rig's time, or until a condition holds. Returns whether it holds."""
     end = rig.now() + seconds
     while rig.now() < end:

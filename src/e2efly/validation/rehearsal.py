@@ -18,7 +18,7 @@ from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.runtime import Acting, RuntimeState
 from e2efly.tasks.route import Route, course_for, route_of, usual_route
-from e2efly.validation.bridge_session import REACH, Bench, FlownSession, Session, open_fence, rehearsal_settings
+from e2efly.validation.bridge_session import REACH, FlightBench, FlownSession, Session, open_fence, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
@@ -123,7 +123,7 @@ def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) 
 
 
 def whole_flight(
-    rig: Bench, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
+    rig: FlightBench, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
     fence: Fence | None,
 ) -> Rehearsal:  # fmt: skip
     """One whole flight on a bench, from the ground to the ground; see `rehearse`. The latency is the bench's."""

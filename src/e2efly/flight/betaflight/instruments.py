@@ -15,8 +15,8 @@ from e2efly.flight.betaflight.client import Client
 from e2efly.flight.betaflight.controller import ControllerInfo
 from e2efly.flight.betaflight.messages import AttitudeReply, BatteryState, Rc, StatusEx
 from e2efly.flight.betaflight.sticks import RATES_PULSE, Sticks
-from e2efly.flight.pilot.channels import mission_of, pilot_of
 from e2efly.flight.pilot.flight_state import Mission, Pilot
+from e2efly.flight.pilot.receiver import mission_of, pilot_of
 from e2efly.flight.settings import FlightSettings
 
 RECEIVER_LOST = frozenset({"RXLOSS", "FAILSAFE"})

@@ -42,7 +42,7 @@ class Needed:
 
 
 @dataclass(frozen=True)
-class Dialect:
+class MavlinkDialect:
     """One autopilot that speaks MAVLink."""
 
     name: str
@@ -103,7 +103,7 @@ _RECEIVER_LOSS = {
     0: "nothing", 1: "Hold, which never lands", 2: "Return, which needs a global position", 3: "Land",
     5: "Terminate", 6: "Disarm: it falls",
 }  # fmt: skip
-PX4 = Dialect(
+PX4 = MavlinkDialect(
     name="PX4",
     autopilot=12,
     mode=6 << 16,
@@ -145,7 +145,7 @@ _THROTTLE_LOSS = {
     4: "return, which needs a position", 5: "return, which needs a position", 6: "return, which needs a position",
     7: "Brake, which never lands",
 }  # fmt: skip
-ARDUPILOT = Dialect(
+ARDUPILOT = MavlinkDialect(
     name="ArduCopter",
     autopilot=3,
     mode=20,
@@ -182,7 +182,7 @@ ARDUPILOT = Dialect(
 DIALECTS = (PX4, ARDUPILOT)
 
 
-def dialect_of(number: int) -> Dialect:
+def dialect_of(number: int) -> MavlinkDialect:
     """The dialect of an autopilot by its number in HEARTBEAT.
 
     Raises:
@@ -195,7 +195,7 @@ def dialect_of(number: int) -> Dialect:
     return found
 
 
-def release_row(dialect: Dialect, version: tuple[int, int, int]) -> Row:
+def release_row(dialect: MavlinkDialect, version: tuple[int, int, int]) -> Row:
     """The version as a row of the table: one that nobody has read is refused by its name."""
     known = version[:2] in dialect.releases
     first, last = (".".join(map(str, release)) for release in (dialect.releases[0], dialect.releases[-1]))

@@ -15,7 +15,7 @@ from e2efly.flight.attitude import Attitude
 from e2efly.flight.autopilot import HOLE, AutopilotState, InertialReading, Outgoing
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.link import Link
-from e2efly.flight.mavlink.dialect import PX4, Dialect, dialect_of, release_row
+from e2efly.flight.mavlink.dialect import PX4, MavlinkDialect, dialect_of, release_row
 from e2efly.flight.mavlink.station import (
     REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
@@ -24,8 +24,8 @@ from e2efly.flight.mavlink.station import (
     interval_us,
 )
 from e2efly.flight.mavlink.wire import BY_NAME
-from e2efly.flight.pilot.channels import deflection, mission_of
 from e2efly.flight.pilot.flight_state import Mission, Pilot
+from e2efly.flight.pilot.receiver import deflection, mission_of
 from e2efly.flight.row import Row
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.contract import Contract
@@ -60,7 +60,7 @@ class Mavlink:
     def __init__(self, station: Station, settings: FlightSettings, clock: Clock = MONOTONIC) -> None:
         """Fly the autopilot at the other end of a station's link; see `connect`."""
         self.station, self.settings = station, settings
-        self.dialect: Dialect = PX4
+        self.dialect: MavlinkDialect = PX4
         """Known once it is identified."""
         self.version = 0, 0, 0
         self.parameters: dict[str, float] = {}

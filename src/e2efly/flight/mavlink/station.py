@@ -8,7 +8,7 @@ from typing import Any
 
 from e2efly.flight.autopilot import HOLE, arrived
 from e2efly.flight.link import MOST, Link
-from e2efly.flight.mavlink.wire import FrameReader, Message, encode
+from e2efly.flight.mavlink.wire import FrameReader, MavlinkMessage, encode
 
 COMPONENT = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
@@ -104,7 +104,7 @@ class Station:
         """
         return arrived(self._echoed, start, end, hole)
 
-    def _take(self, message: Message, now: float) -> None:
+    def _take(self, message: MavlinkMessage, now: float) -> None:
         told = message.fields
         if message.name == "HEARTBEAT":
             if told["autopilot"] == INVALID or message.component != 1:

@@ -20,7 +20,7 @@ LARGEST = HEADER + 255 + 2 + SIGNATURE
 
 
 @dataclass(frozen=True)
-class Layout:
+class MessageLayout:
     """How a message is laid out."""
 
     name: str
@@ -59,10 +59,10 @@ def _count(kind: str) -> int:
     return 1 if kind.endswith("s") or len(kind) == 1 else int(kind[:-1])
 
 
-def _layout(name: str, id: int, extra: int, fields: str) -> Layout:
+def _layout(name: str, id: int, extra: int, fields: str) -> MessageLayout:
     """`fields` is a list of name:format, separated by blanks."""
     pairs = [part.partition(":") for part in fields.split()]
-    return Layout(name, id, extra, tuple((name, kind) for name, _, kind in pairs))
+    return MessageLayout(name, id, extra, tuple((name, kind) for name, _, kind in pairs))
 
 
 _IMU = ["xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro", "xmag", "ymag", "zmag"]
@@ -144,7 +144,7 @@ def encode(name: str, values: Mapping[str, Any], *, sequence: int, system: int, 
 
 
 @dataclass(frozen=True)
-class Message:
+class MavlinkMessage:
     """A message that has come."""
 
     name: str
@@ -165,7 +165,7 @@ class FrameReader:
     """Number of bytes so far where a frame of MAVLink 1 may begin."""
     _rest: bytearray = field(default_factory=bytearray)
 
-    def feed(self, data: bytes) -> Iterator[Message]:
+    def feed(self, data: bytes) -> Iterator[MavlinkMessage]:
         """The messages that are complete now. Those of other kinds than `LAYOUTS` are left out."""
         rest = self._rest
         rest += data
@@ -195,7 +195,7 @@ class FrameReader:
                 self.bad_checksums += 1
                 self._skip()
                 continue
-            yield Message(layout.name, rest[5], rest[6], layout.unpack(bytes(rest[HEADER:body])))
+            yield MavlinkMessage(layout.name, rest[5], rest[6], layout.unpack(bytes(rest[HEADER:body])))
             del rest[:end]
 
     def _plausible(self, end: int) -> bool:
