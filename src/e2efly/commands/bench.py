@@ -13,7 +13,7 @@ from e2efly.simulation.device import cores, prepare, processor
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure this machine: physics, environment and training steps per second. (`e2efly benchmark` scores policies.)"""
+    """Measure this machine: physics, environment and training steps a second. (`e2efly benchmark` scores policies.)"""
 
     json: Path | None = None
     """Write the figures to this file."""

@@ -1,6 +1,5 @@
 """`e2efly benchmark`: score anybody's policy. How fast this machine is tells `e2efly bench`."""
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal

@@ -1,11 +1,8 @@
 """A card of `e2efly benchmark` for people: the page, and the one line of a policy. Imports no JAX."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from e2efly.commands.terminal import markdown
-
-if TYPE_CHECKING:
-    from e2efly.validation.scorecard import Mean
 
 HELD = 0.95
 """Success with which a policy is said to fly with a latency."""
@@ -114,7 +111,7 @@ def _mean(part: dict[str, Any] | None) -> str:
 
     if part is None or not part.get("rows"):
         return "-"
-    mean: Mean = Mean.of(part["rows"])
+    mean = Mean.of(part["rows"])
     lowest = "" if mean.lowest == 1 else f"; {mean.worst} {percent(mean.lowest)}"
     return f"{percent(mean.success)} ({between(mean.interval)}){lowest}"
 

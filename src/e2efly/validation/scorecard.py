@@ -135,8 +135,8 @@ def score(
         told: called with the name of each part that is going to be flown.
 
     Returns:
-        The parts as JSON: `parts_of` with `version`, `seed`, date, processor, and `rows`, for each row and criterion the figures of
-        `environment.episodes.summary`; or with `refused`, why the place does not fly the policy.
+        The parts as JSON: `parts_of` with version, seed, date and processor, and with `rows`: for each row and
+        criterion the figures of `environment.episodes.summary`. Or with `refused`: why a plant does not fly the policy.
 
     Raises:
         OSError: when a plant cannot be started.
