@@ -104,6 +104,13 @@ def test_what_does_not_fit_is_named(contract: dict[str, Any], file: dict[str, An
     assert not paths[2].exists()
 
 
+def test_the_contract_of_the_page_is_one(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    example = text.split("```json\n")[1].split("```")[0]
+    adopt(*written(tmp_path, json.loads(example)))
+    assert load_policy(tmp_path / "ours.onnx").contract.action.high == (25, 6, 6, 3)
+
+
 def test_a_node_that_no_policy_may_hold_is_refused(tmp_path: Path) -> None:
     paths = written(tmp_path)
     model = onnx.load(paths[0])

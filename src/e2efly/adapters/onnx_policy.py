@@ -150,7 +150,7 @@ def _object(value: Any, where: str, kind: type) -> dict[str, Any]:
     return {field.name: field.default for field in fields} | value
 
 
-def adopt(file: Path, contract: Path, target: Path) -> None:
+def adopt(file: Path, contract: Path, target: Path) -> ForeignContract:
     """Write an ONNX file of another program, with its contract, as a policy.onnx.
 
     Args:
@@ -158,6 +158,9 @@ def adopt(file: Path, contract: Path, target: Path) -> None:
             `MatMul` by constants, `Flatten` and `Constant` are rewritten as such.
         contract: its contract: `ForeignContract` as JSON.
         target: the file to write.
+
+    Returns:
+        The contract.
 
     Raises:
         ValueError: naming the file, the field or the node, its value and what is accepted.
@@ -180,6 +183,7 @@ def adopt(file: Path, contract: Path, target: Path) -> None:
     except (ValueError, onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         target.unlink(missing_ok=True)
         raise ValueError(f"{file}: {error}") from None
+    return said
 
 
 def _env(said: ForeignContract, usual: EnvConfig) -> EnvConfig:

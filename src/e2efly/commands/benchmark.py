@@ -125,8 +125,8 @@ def _entered(options: Benchmark, policy: str, file: Path) -> Any:
     if path.suffix == ".onnx" and contract.is_file():
         from e2efly.adapters.onnx_policy import adopt
 
-        adopt(path, contract, file)
-        return entrant(file, vehicle, options.controller, options.baseline)
+        said = adopt(path, contract, file)
+        return entrant(file, vehicle or said.vehicle, options.controller, options.baseline)
     found = policy_file(path, vehicle)
     content = file_content(found)
     if not is_sealed(content):
