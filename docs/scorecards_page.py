@@ -33,10 +33,10 @@ alone, in the preset of its task: the options of its training do not count.
 
 | part | where | rows | starts a row |
 | --- | --- | --- | --- |
-| latency | training simulator | {", ".join(f"{1e3 * late:.0f}" for late in LATENCIES)} ms from observation to command | \
-{Benchmark.episodes} |
-| trained | training simulator | the {len(rows_for(()))} rows of [the stress](robustness.md#stress) that trainings draw \
-from; more with cameras | {Benchmark.episodes} |
+| latency | training simulator | {", ".join(f"{1e3 * late:.0f}" for late in LATENCIES)} ms from observation to command \
+| {Benchmark.episodes} |
+| trained | training simulator | the {len(rows_for(()))} rows of [the stress](robustness.md#stress) that trainings \
+draw from; more with cameras | {Benchmark.episodes} |
 | untrained | training simulator | {len(LAWS)} rows from laws that no training draws from | {Benchmark.episodes} |
 | trained | each of `--plants` | {", ".join(ON_PLANTS[TRAINED])} | {Benchmark.flights} |
 | untrained | each of `--plants` | {", ".join(ON_PLANTS[UNTRAINED])} | {Benchmark.flights} |
@@ -45,13 +45,12 @@ The mean of several rows has the interval of as many starts as one row has, beca
 that a plant cannot reproduce are left out. A plant that does not fly a policy at all, as none flies one that commands
 rotors, says so on the card.
 
-**Seeds.** All starts and draws are of seed {SEED}, version {VERSION} of the benchmark. They are recorded in the card. No
-option changes the seed, no default of another command and no other published figure has it, and the starts are of the
-stream of `eval`, from which no training draws. Do not tune on them: for that, there are `e2efly eval --seed` and
-`--stress`.
+**Seeds.** All starts and draws are of seed {SEED}, version {VERSION} of the benchmark; the card records both. No option
+changes the seed. No default of another command and no other published figure has it, and the starts are of the stream
+of `eval`, from which no training draws. Do not tune on them: for that, there is `e2efly eval --stress --seed`.
 
-**Scale.** `--episodes` and `--flights` say how much is flown. The card is written after each part. The same command goes
-on where an interrupted one was, and flies again only what has another scale, policy, vehicle or version of e2efly.
+**Scale.** `--episodes` and `--flights` say how much is flown. The card is written after each part. The same command
+goes on where an interrupted one was, and flies again only what has another scale, policy, vehicle or version of e2efly.
 
 ## A policy of Stable-Baselines3
 Its own file cannot be read without running the code in it. Export the model, then score it:
@@ -89,18 +88,19 @@ FIELDS = f"""```
 | --- | --- |
 | `task`, `vehicle` | a task that is flown by state, and a vehicle or its .toml file |
 | `control_rate_hz` | the rate at which the network is called |
-| `latency_range_s` | the latencies of its training; if left out, the vehicle's own. The policy flies with the vehicle's, \
-or with their mean if that is not among them |
+| `latency_range_s` | the latencies of its training; if left out, the vehicle's own. The policy flies with the \
+vehicle's, or with their mean if that is not among them |
 | `past_actions` | how many of its own last outputs it sees, newest first; if left out, 0 |
 | `observation` | what it sees, in its order. `field`: a field of the task or `attitude`, `velocity`, `body_rate`, \
 `past_actions`, in the [units and frames](conventions.md) of e2efly. `frame`: `world`, or `body` for vectors that it \
-sees in the body frame. `form` of the attitude: {", ".join(f"`{form}`" for form in FORMS)}. `scale`: a factor on the numbers |
+sees in the body frame. `form` of the attitude: {", ".join(f"`{form}`" for form in FORMS)}; matrices are from body to \
+world. `scale`: a factor on the numbers |
 | `action` | `mode`: a command mode of `e2efly list rest`. `low` and `high`: the commands at the two `limits` of its \
 output (if left out, -1 and 1). `order`: for each number of the mode's command, its place in the output |
 
 The network has one input, (1, k) or (n, k), one output of four numbers, and no memory. Its operators are of version
-{OPSETS[0]} to {OPSETS[-1]}, and those that a policy of e2efly may hold: linear layers with the usual activations. What does
-not fit is refused by name. The benchmark writes it as a policy.onnx of e2efly into the folder of the card, where
+{OPSETS[0]} to {OPSETS[-1]}, and those that a policy of e2efly may hold: linear layers with the usual activations. What
+does not fit is refused by name. The benchmark writes it as a policy.onnx of e2efly into the folder of the card, where
 `e2efly eval`, `validate` and `fly` take it, too.
 
 ## Scores
@@ -120,7 +120,7 @@ def page() -> str:
         f"VIS-R, {found['episodes']} starts a row and {found['flights']} on MuJoCo, by `benchmarks/scorecards.py`, "
         f"{found['date']}, {machine['cores']} cores of {machine['cpu']}, e2efly {machine['e2efly']}."
     )
-    rows = sorted(found["table"], key=lambda row: TASKS.index(row["task"]))
+    rows = sorted(found["table"], key=lambda row: (TASKS.index(row["task"]), row["policy"] != row["task"]))
     return "\n".join([HEAD + EXAMPLE + FIELDS, about, "", *markdown(rows), AFTER])
 
 

@@ -104,6 +104,19 @@ def test_what_does_not_fit_is_named(contract: dict[str, Any], file: dict[str, An
     assert not paths[2].exists()
 
 
+def test_a_contract_may_leave_out_what_is_usual(tmp_path: Path) -> None:
+    action = {name: ACTION[name] for name in ("mode", "low", "high")}
+    lean = {name: CONTRACT[name] for name in ("task", "vehicle", "control_rate_hz")}
+    network = written(
+        tmp_path, lean | {"observation": [{"field": "position_error"}] * 6 + [{"field": "attitude"}], "action": action}
+    )
+    said = adopt(*network)
+    assert (said.action.limits, said.action.order, said.past_actions) == ((-1, 1), (0, 1, 2, 3), 0)
+    contract = load_policy(tmp_path / "ours.onnx").contract
+    assert contract.latency_range_s == (0.06, 0.06)  # of the vehicle
+    assert contract.past_actions == 0
+
+
 def test_the_contract_of_the_page_is_one(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "benchmark.md").read_text(encoding="utf-8")
     example = text.split("```json\n")[1].split("```")[0]

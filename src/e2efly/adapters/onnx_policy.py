@@ -110,7 +110,7 @@ def _contract(content: Any) -> ForeignContract:
     for name, (less, more) in {"low": (low, high), "limits": (limits[:1], limits[1:])}.items():
         if not all(a < b for a, b in zip(less, more, strict=True)):
             raise read.refusal(f"action.{name}", action[name], "numbers that rise, from action.low to action.high")
-    order = tuple(action["order"]) if isinstance(action["order"], list | tuple) else ()
+    order = tuple(action["order"]) if isinstance(action["order"], list) else ()
     if sorted(map(repr, order)) != ["0", "1", "2", "3"]:
         raise read.refusal("action.order", action["order"], "the places 0, 1, 2, 3, each once")
     entries = read.entries(found["observation"], "observation", None)
@@ -147,7 +147,8 @@ def _object(value: Any, where: str, kind: type) -> dict[str, Any]:
             raise ValueError("contract: " + unknown("key", prefix + key, [prefix + name for name in known]))
     if missing := [prefix + key for key in required if key not in value]:
         raise ValueError(f"contract: lacks {', '.join(missing)}; accepted: all of {', '.join(required)}")
-    return {field.name: field.default for field in fields} | value
+    usual = {field.name: field.default for field in fields}
+    return {name: list(x) if isinstance(x, tuple) else x for name, x in usual.items()} | value
 
 
 def adopt(file: Path, contract: Path, target: Path) -> ForeignContract:

@@ -76,7 +76,8 @@ def _card(card: dict[str, Any]) -> list[str]:
     lines += [line for note in card["notes"] for line in (note, "")]
     for part in card["parts"]:
         lines += [f"### {WORDS[part['kind']]}: {part['place']}", ""]
-        lines += [f"{part['episodes']} starts a row, {part['date']}, {part['cpu']}, e2efly {part['e2efly']}.", ""]
+        flown = f"{part['episodes']} starts a row, in {part['seconds']:.0f} s on {part['cpu']}"
+        lines += [f"{flown}, {part['date']}, e2efly {part['e2efly']}.", ""]
         if "refused" in part:
             lines += [f"Not flown: {part['refused']}", ""]
             continue

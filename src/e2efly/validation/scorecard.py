@@ -6,6 +6,7 @@ two files of the same policy have the same scores, whatever their trainings drew
 
 import dataclasses
 import hashlib
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -135,7 +136,7 @@ def score(
         told: called with the name of each part that is going to be flown.
 
     Returns:
-        The parts as JSON: `parts_of` with version, seed, date and processor, and with `rows`: for each row and
+        The parts as JSON: `parts_of` with version, seed, date, processor and seconds, and with `rows`: for each row and
         criterion the figures of `environment.episodes.summary`. Or with `refused`: why a plant does not fly the policy.
 
     Raises:
@@ -146,8 +147,9 @@ def score(
     for i, key in enumerate(wanted):
         if parts[i] is None:
             told(f"{key['kind']} rows in {key['place']}")
-            where = {"date": f"{datetime.now(UTC):%Y-%m-%d}", "cpu": processor()[0]}
-            parts[i] = {**key, **where, **_flown(found, key["place"], key["kind"], key["episodes"])}
+            where, began = {"date": f"{datetime.now(UTC):%Y-%m-%d}", "cpu": processor()[0]}, time.perf_counter()
+            flown = _flown(found, key["place"], key["kind"], key["episodes"])
+            parts[i] = {**key, **where, "seconds": round(time.perf_counter() - began, 1), **flown}
             keep([part for part in parts if part is not None])
     return [part for part in parts if part is not None]
 
