@@ -14,7 +14,7 @@ from e2efly.environment.episodes import wilson
 from e2efly.runs import presets
 from e2efly.runs.inputs import to_json
 from e2efly.validation import evaluation, scorecard
-from e2efly.validation.scorecard import SEED, Mean, Scale, entrant, parts_of, score
+from e2efly.validation.scorecard import SEED, Mean, CardScale, entrant, parts_of, score
 from e2efly.validation.stress_laws import LAWS
 from tests.commands.test_cli import error_of
 from tests.policy.made import made
@@ -62,16 +62,16 @@ def test_an_interrupted_card_keeps_its_finished_parts(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(scorecard, "_flown", fly)
     with pytest.raises(KeyboardInterrupt):
-        score(found, Scale(4, 2), [], kept.append)
+        score(found, CardScale(4, 2), [], kept.append)
     assert flown == ["training latency 4", "training trained 4"]
     done = kept[-1]
     flown.clear()
     monkeypatch.setattr(scorecard, "_flown", lambda found, place, kind, n: flown.append(f"{place} {kind} {n}") or {})
-    parts = score(found, Scale(4, 2), done, kept.append)
+    parts = score(found, CardScale(4, 2), done, kept.append)
     assert flown == ["training untrained 4", "mujoco trained 2", "mujoco untrained 2"]
-    assert [(part["place"], part["kind"]) for part in parts] == [(x["place"], x["kind"]) for x in parts_of(Scale())]
+    assert [(part["place"], part["kind"]) for part in parts] == [(x["place"], x["kind"]) for x in parts_of(CardScale())]
     flown.clear()
-    score(found, Scale(5, 2), parts, kept.append)
+    score(found, CardScale(5, 2), parts, kept.append)
     assert [text.split()[-1] for text in flown] == ["5", "5", "5"]  # another scale, but not on the plant
 
 
@@ -161,4 +161,4 @@ def test_a_plant_whose_package_is_missing_is_named_before_anything_flies(monkeyp
     with pytest.raises(
         ValueError, match=r"plant 'mujoco' needs the package no_such_package: pip install 'e2efly\[x\]'"
     ):
-        Scale().check()
+        CardScale().check()

@@ -39,7 +39,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Shown:
+class NetworkInput:
     """A part of what a network of another program sees."""
 
     field: str
@@ -53,7 +53,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Returned:
+class NetworkOutput:
     """What a network of another program returns."""
 
     mode: str
@@ -78,9 +78,9 @@ class ForeignContract:
     """Name or .toml file of the vehicle for which it was trained."""
     control_rate_hz: float
     """Rate at which it is called, Hz."""
-    observation: tuple[Shown, ...]
+    observation: tuple[NetworkInput, ...]
     """What it sees, in its order."""
-    action: Returned
+    action: NetworkOutput
     """What it returns."""
     past_actions: int = 0
     """Number of its own last outputs that `past_actions` shows."""
@@ -103,7 +103,7 @@ def read_contract(path: Path) -> ForeignContract:
 
 def _contract(content: Any) -> ForeignContract:
     found = _object(content, "", ForeignContract)
-    action = _object(found["action"], "action", Returned)
+    action = _object(found["action"], "action", NetworkOutput)
     mode = read.one_of(action["mode"], "action.mode", COMMAND_MODES)
     low, high = (read.numbers(action[name], f"action.{name}", 4) for name in ("low", "high"))
     limits = read.numbers(action["limits"], "action.limits", 2)
@@ -120,15 +120,15 @@ def _contract(content: Any) -> ForeignContract:
         vehicle=read.text(found["vehicle"], "vehicle"),
         control_rate_hz=read.number(found["control_rate_hz"], "control_rate_hz"),
         observation=tuple(_shown(entry, f"observation[{i}]") for i, entry in enumerate(entries)),
-        action=Returned(mode, low, high, limits, order),
+        action=NetworkOutput(mode, low, high, limits, order),
         past_actions=read.whole(found["past_actions"], "past_actions", 0),
         latency_range_s=read.seconds_range(latency, "latency_range_s") if latency else (),
     )
 
 
-def _shown(value: Any, where: str) -> Shown:
-    x = _object(value, where, Shown)
-    return Shown(
+def _shown(value: Any, where: str) -> NetworkInput:
+    x = _object(value, where, NetworkInput)
+    return NetworkInput(
         field=read.text(x["field"], f"{where}.field"),
         frame=read.one_of(x["frame"], f"{where}.frame", ("world", "body")),
         form=read.one_of(x["form"], f"{where}.form", FORMS),

@@ -56,9 +56,9 @@ def run(options: Benchmark) -> int:
         OSError: when the folder cannot be written, or a plant cannot be started.
     """
     from e2efly.simulation.device import prepare
-    from e2efly.validation.scorecard import SEED, VERSION, Scale, about, score
+    from e2efly.validation.scorecard import SEED, VERSION, CardScale, about, score
 
-    scale = Scale(options.episodes, options.flights, options.plants)
+    scale = CardScale(options.episodes, options.flights, options.plants)
     scale.check()
     labels = _labels(options.policies)
     prepare(options.device)

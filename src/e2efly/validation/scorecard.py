@@ -45,7 +45,7 @@ ON_PLANTS = {
 
 
 @dataclass(frozen=True)
-class Scale:
+class CardScale:
     """How much is flown."""
 
     episodes: int = 100
@@ -110,7 +110,7 @@ def about(found: Candidate) -> dict[str, Any]:
     }
 
 
-def parts_of(scale: Scale) -> Iterator[dict[str, Any]]:
+def parts_of(scale: CardScale) -> Iterator[dict[str, Any]]:
     """The parts of a card, in their order: each a place, a kind of rows, and a number of starts."""
     for kind in (LATENCY, TRAINED, UNTRAINED):
         yield {"place": HOME, "kind": kind, "episodes": scale.episodes}
@@ -121,7 +121,7 @@ def parts_of(scale: Scale) -> Iterator[dict[str, Any]]:
 
 def score(
     found: Candidate,
-    scale: Scale,
+    scale: CardScale,
     known: list[dict[str, Any]],
     keep: Callable[[list[dict[str, Any]]], None],
     told: Callable[[str], None] = lambda text: None,
