@@ -14,7 +14,7 @@ from e2efly.environment.episodes import wilson
 from e2efly.runs import presets
 from e2efly.runs.inputs import to_json
 from e2efly.validation import evaluation, scorecard
-from e2efly.validation.scorecard import SEED, Mean, CardScale, entrant, parts_of, score
+from e2efly.validation.scorecard import SEED, CardScale, Mean, entrant, parts_of, score
 from e2efly.validation.stress_laws import LAWS
 from tests.commands.test_cli import error_of
 from tests.policy.made import made
