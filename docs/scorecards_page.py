@@ -41,8 +41,8 @@ draw from; more with cameras | {Benchmark.episodes} |
 | trained | each of `--plants` | {", ".join(ON_PLANTS[TRAINED])} | {Benchmark.flights} |
 | untrained | each of `--plants` | {", ".join(ON_PLANTS[UNTRAINED])} | {Benchmark.flights} |
 
-The mean of several rows has the interval of as many starts as one row has, because all rows have the same starts. Rows
-that a plant cannot reproduce are left out. A plant that does not fly a policy at all, as none flies one that commands
+The mean of several rows has the interval of as many starts as one row has, because all rows have the same starts. The
+card names the rows that a plant cannot reproduce. A plant that does not fly a policy at all, as none flies one that commands
 rotors, says so on the card.
 
 **Seeds.** All starts and draws are of seed {SEED}, version {VERSION} of the benchmark; the card records both. No option

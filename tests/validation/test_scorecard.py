@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from e2efly.commands import benchmark
+from e2efly.commands.benchmark_card import page
 from e2efly.commands.cli import run
 from e2efly.config.storage import write_json
 from e2efly.environment.episodes import wilson
@@ -104,14 +105,29 @@ def test_a_card_has_every_part_and_the_same_command_goes_on(
         ("mujoco", ["nominal"], 1),
         ("mujoco", ["delay walks"], 1),
     ]
-    page = (tmp_path / "card" / "card.md").read_text()
-    assert "| hover | hover | vis_r | 100.0 (51.0 to 100.0) | 100.0 (51.0 to 100.0) | " in page
-    assert "### Rows from laws that no training draws from: mujoco" in page
+    shown = (tmp_path / "card" / "card.md").read_text()
+    assert "| hover | hover | vis_r | 100.0 (51.0 to 100.0) | 100.0 (51.0 to 100.0) | " in shown
+    assert "### Rows from laws that no training draws from: mujoco" in shown
     capsys.readouterr()
     monkeypatch.setattr(scorecard, "_flown", lambda *_: pytest.fail("it is known"))
     assert run(asked) == 0
     assert "100.0 (51.0 to 100.0)" in capsys.readouterr().out
     assert json.loads((tmp_path / "card" / "card.json").read_text()) == card
+
+
+def test_rows_that_a_plant_cannot_reproduce_are_named_on_the_card(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del small
+    plant = scorecard.find_plant("mujoco")
+    monkeypatch.setattr(plant, "alters", plant.alters - {"mass"})
+    monkeypatch.setattr(scorecard, "ON_PLANTS", {"trained": ("nominal", "mass x1.25")})
+    found = entrant(made(tmp_path / "x.onnx", 0.01))
+    part = scorecard._flown(found, "mujoco", "trained", 1)
+    assert (list(part["rows"]), part["left_out"]) == (["nominal"], {"mass x1.25": "mass"})
+    shown = {"place": "mujoco", "kind": "trained", "episodes": 1, "seconds": 1.0, "cpu": "x", "date": "", "e2efly": ""}
+    card = {"policy": "x", **scorecard.about(found), "notes": [], "parts": [shown | part]}
+    assert "Left out: mass x1.25; mujoco cannot change mass." in page({"benchmark": 1, "seed": SEED, "cards": [card]})
 
 
 def test_a_plant_that_does_not_fly_a_policy_is_told_on_the_card(small: None, tmp_path: Path) -> None:

@@ -82,6 +82,8 @@ def _card(card: dict[str, Any]) -> list[str]:
             lines += [f"Not flown: {part['refused']}", ""]
             continue
         lines += [*markdown([row for name, criteria in part["rows"].items() for row in _rows(name, criteria)]), ""]
+        for row, lack in part.get("left_out", {}).items():
+            lines += [f"Left out: {row}; {part['place']} cannot change {lack}.", ""]
     return lines
 
 

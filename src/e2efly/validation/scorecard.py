@@ -137,7 +137,8 @@ def score(
 
     Returns:
         The parts as JSON: `parts_of` with version, seed, date, processor and seconds, and with `rows`: for each row and
-        criterion the figures of `environment.episodes.summary`. Or with `refused`: why a plant does not fly the policy.
+        criterion the figures of `environment.episodes.summary`. On a plant also `left_out`, the rows that it cannot
+        reproduce with what it cannot change; or only `refused`, why it does not fly the policy.
 
     Raises:
         OSError: when a plant cannot be started.
@@ -172,12 +173,13 @@ def _late(found: Candidate, latency: float, episodes: int) -> dict[str, Any]:
 def _on_plant(found: Candidate, plant: str, kind: str, episodes: int) -> dict[str, Any]:
     able = find_plant(plant)
     flies: dict[str, Any] = {"vehicle": found.vehicle, "controller": found.controller, "baseline": found.baseline}
-    rows = tuple(row for row in ON_PLANTS[kind] if not plant_stress.lacking(able, ROWS.get(row) or LAWS[row]))
+    lacks = {row: plant_stress.lacking(able, ROWS.get(row) or LAWS[row]) for row in ON_PLANTS[kind]}
+    rows, left_out = tuple(row for row in lacks if not lacks[row]), {row: lack for row, lack in lacks.items() if lack}
     try:
         report = plant_stress.stress(found.file, plant, episodes, rows=rows, seed=SEED, **flies)
     except ValueError as error:
         return {"refused": str(error)}
-    return {"rows": _summed(report.flown)}
+    return {"rows": _summed(report.flown), "left_out": left_out}
 
 
 def _summed(flown: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
