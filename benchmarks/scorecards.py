@@ -1,10 +1,10 @@
 """Cards of `e2efly benchmark` of the zoo's policies of VIS-R, and of the hover controllers in their place.
 
-    python benchmarks/scorecards.py [--policies hover land track race] [--controllers pid geometric indi mpc]
+    python benchmarks/scorecards.py [--policies hover land track race] [--flown policy pid geometric indi mpc]
         [--out runs/scorecards] [--episodes 100] [--flights 5]
 
-The folder keeps the cards: a script that was stopped goes on where it was. `--policies any/hover` and others are
-measured about VIS-R, too. What is not measured anew stays in the file.
+`--flown`: the policy itself, and controllers. The folder keeps the cards: a script that was stopped goes on where it
+was. `--policies any/hover` is measured about VIS-R, too. What is not measured anew stays in the file.
 """
 
 from pathlib import Path
@@ -22,14 +22,14 @@ KEYS = ("policy", "task", "vehicle")
 """What names a line of the table."""
 
 
-def card_of(policy: str, controller: str | None, out: Path, episodes: int, flights: int) -> dict[str, Any]:
+def card_of(policy: str, flown: str, out: Path, episodes: int, flights: int) -> dict[str, Any]:
     """The card of a policy, or of a controller in its place."""
-    folder = out / "-".join([policy.replace("/", "-"), controller or "policy"])
+    folder, controller = out / f"{policy.replace('/', '-')}-{flown}", None if flown == "policy" else flown
     status = run(
         Benchmark((policy,), controller, VEHICLE, episodes=episodes, flights=flights, out=folder, device="cpu")
     )
     if status:
-        raise RuntimeError(f"{policy}, {controller}: status {status}")
+        raise RuntimeError(f"{policy}, {flown}: status {status}")
     return read_json(folder / "card.json")["cards"][0]
 
 
@@ -47,13 +47,13 @@ def successes(card: dict[str, Any]) -> dict[str, Any]:
 def main() -> None:
     """Measure every card that is asked for; write the table after each."""
     options = arguments(
-        __doc__ or "", policies=["hover", "land", "track", "race"], controllers=["pid", "geometric", "indi", "mpc"],
+        __doc__ or "", policies=["hover", "land", "track", "race"], flown=["policy", "pid", "geometric", "indi", "mpc"],
         out="runs/scorecards", episodes=100, flights=5,
     )  # fmt: skip
     scale = {"episodes": options.episodes, "flights": options.flights}
     for policy in options.policies:
-        for controller in (None, *options.controllers):
-            card = card_of(policy, controller, Path(options.out), **scale)
+        for flown in options.flown:
+            card = card_of(policy, flown, Path(options.out), **scale)
             row = in_short(card)
             rows = with_earlier("scorecards", options.json, "table", KEYS, [row])
             about = {key: row[key] for key in KEYS} | {"sha256": card["sha256"], "rows": successes(card)}

@@ -42,8 +42,8 @@ draw from; more with cameras | {Benchmark.episodes} |
 | untrained | each of `--plants` | {", ".join(ON_PLANTS[UNTRAINED])} | {Benchmark.flights} |
 
 The mean of several rows has the interval of as many starts as one row has, because all rows have the same starts. The
-card names the rows that a plant cannot reproduce. A plant that does not fly a policy at all, as none flies one that commands
-rotors, says so on the card.
+card names the rows that a plant cannot reproduce. A plant that does not fly a policy at all, as none flies one that
+commands rotors, says so on the card.
 
 **Seeds.** All starts and draws are of seed {SEED}, version {VERSION} of the benchmark; the card records both. No option
 changes the seed. No default of another command and no other published figure has it, and the starts are of the stream
