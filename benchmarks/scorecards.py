@@ -25,9 +25,7 @@ KEYS = ("policy", "task", "vehicle")
 def card_of(policy: str, flown: str, out: Path, episodes: int, flights: int) -> dict[str, Any]:
     """The card of a policy, or of a controller in its place."""
     folder, controller = out / f"{policy.replace('/', '-')}-{flown}", None if flown == "policy" else flown
-    status = run(
-        Benchmark((policy,), controller, VEHICLE, episodes=episodes, flights=flights, out=folder, device="cpu")
-    )
+    status = run(Benchmark((policy,), controller, VEHICLE, episodes=episodes, flights=flights, out=folder))
     if status:
         raise RuntimeError(f"{policy}, {flown}: status {status}")
     return read_json(folder / "card.json")["cards"][0]

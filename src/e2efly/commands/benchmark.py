@@ -1,8 +1,9 @@
 """`e2efly benchmark`: score anybody's policy. How fast this machine is tells `e2efly bench`."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
@@ -37,15 +38,13 @@ class Benchmark:
     plants: tuple[str, ...] = ("mujoco",)
     """Plants that fly eleven of the rows: simulator, mujoco, betaflight, or your own, path/to/plant.py:Name."""
     episodes: int = 100
-    """Starts per row and criterion in the training simulator. With 100, a policy of hover takes a minute on two cores,
-    and with 25 and --flights 1 half of that."""
+    """Starts per row and criterion in the training simulator. A card of hover takes a minute on two cores, and with 25
+    and --flights 1 two thirds of that; one of track, with two criteria, three minutes."""
     flights: int = 5
     """Starts per row and criterion on each plant, a quarter to one second each."""
     out: Path | None = None
     """Folder for card.md, card.json and the files that were scored. If omitted, runs/benchmark-NAMES. Parts that its
     card.json has of the same policy and scale are not flown again."""
-    device: Literal["cpu", "gpu"] | None = None
-    """Device of the training simulator."""
 
 
 def run(options: Benchmark) -> int:
@@ -56,36 +55,43 @@ def run(options: Benchmark) -> int:
         OSError: when the folder cannot be written, or a plant cannot be started.
     """
     from e2efly.simulation.device import prepare
-    from e2efly.validation.scorecard import SEED, VERSION, CardScale, about, score
+    from e2efly.validation.scorecard import CardScale, about, score
 
     scale = CardScale(options.episodes, options.flights, options.plants)
     scale.check()
     labels = _labels(options.policies)
-    prepare(options.device)
+    prepare("cpu")  # as the plants do, so that a card is the same on every machine
     out, console = options.out or _folder(options, labels), Terminal()
     with held(out):
         entered = {name: _entered(options, policy, out / f"{name}.onnx") for name, policy in labels.items()}
-        card, told = out / "card.json", {name: about(found) for name, found in entered.items()}
-        known, cards = _known(card), dict[str, dict[str, Any]]()
+        known, cards = _known(out / "card.json"), dict[str, dict[str, Any]]()
         for name, found in entered.items():
-            same = next((old["parts"] for old in known if told[name].items() <= old.items()), [])
-            cards[name] = {"policy": name, **told[name], "notes": found.notes, "parts": same}
+            told = about(found)
+            same = next((old["parts"] for old in known if told.items() <= old.items()), [])
+            cards[name] = {"policy": name, **told, "notes": found.notes, "parts": same}
         for name, found in entered.items():
             for note in found.notes:
                 console.print(f"{name}: {note}", style="dim")
-
-            def keep(parts: list[dict[str, Any]]) -> None:
-                cards[name]["parts"] = parts  # noqa: B023
-                content = {"benchmark": VERSION, "seed": SEED, "cards": [*cards.values()]}
-                write_json(card, content)
-                write_atomically(out / "card.md", page(content).encode())
-
-            known_parts = cards[name]["parts"]
-            keep(score(found, scale, known_parts, keep, lambda text: console.print(f"{name}: {text}", style="dim")))  # noqa: B023
+            keep, tell = partial(_keep, out, cards, name), partial(_tell, console, name)
+            keep(score(found, scale, cards[name]["parts"], keep, tell))
     for each in cards.values():
         console.print(console_table([in_short(each)]))
     console.print(f"Card: {out / 'card.md'} and card.json")
     return 0
+
+
+def _keep(out: Path, cards: dict[str, dict[str, Any]], name: str, parts: list[dict[str, Any]]) -> None:
+    """Write the card with the parts of a policy that there are now."""
+    from e2efly.validation.scorecard import SEED, VERSION
+
+    cards[name]["parts"] = parts
+    content = {"benchmark": VERSION, "seed": SEED, "cards": [*cards.values()]}
+    write_json(out / "card.json", content)
+    write_atomically(out / "card.md", page(content).encode())
+
+
+def _tell(console: Terminal, name: str, part: str) -> None:
+    console.print(f"{name}: {part}", style="dim")
 
 
 def _labels(policies: tuple[str, ...]) -> dict[str, str]:
