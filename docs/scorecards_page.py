@@ -107,8 +107,8 @@ does not fit is refused by name. The benchmark writes it as a policy.onnx of e2e
 """
 AFTER = """
 Percent of success, with its 95 % interval; behind it the row with the lowest success. *95 % at*: the latencies with
-which at least 95 % succeed. A hover controller flies under the contract of the zoo's policy, at its rate. It is told the
-latency of that contract, also where another one is flown. Success does not measure speed: the controllers race at
+which at least 95 % succeed. A hover controller flies under the contract of the zoo's policy, at its rate. It is told
+the latency of that contract, also where another one is flown. Success does not measure speed: the controllers race at
 3 m/s, the policy as fast as it can. The error and the crashes of each row stand in `card.json` and `card.md`.
 """
 
