@@ -59,6 +59,7 @@ docs: $(DOCS_READY)
 	$(BIN)/python docs/command_line.py
 	$(BIN)/python docs/notebook_pages.py
 	$(BIN)/python docs/gpu_page.py
+	$(BIN)/python docs/scorecards_page.py
 	@$(MAKE) --no-print-directory site
 
 # The variable leaves out a notice of the end of MkDocs Material (docs/decisions.md).

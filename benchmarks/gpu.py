@@ -49,7 +49,7 @@ def physics(short: bool, device: str) -> Iterator[Row]:
     """Sub-steps of the default integrator."""
     from variants import own_parameters
 
-    from e2efly.learning.benchmark import physics_substeps
+    from e2efly.learning.step_rates import physics_substeps
 
     sizes = (64, 256) if short else (1024, 65_536, 1_048_576)
     for n in sizes:
@@ -60,7 +60,7 @@ def physics(short: bool, device: str) -> Iterator[Row]:
 
 def environment(short: bool, device: str) -> Iterator[Row]:
     """Environment steps of hover, everything included."""
-    from e2efly.learning.benchmark import environment_steps
+    from e2efly.learning.step_rates import environment_steps
 
     for n in (64, 256) if short else (1024, 65_536, 524_288):
         yield f"environment steps, hover, {n:,} environments", environment_steps("hover", n), "/s"
@@ -68,7 +68,7 @@ def environment(short: bool, device: str) -> Iterator[Row]:
 
 def training(short: bool, device: str) -> Iterator[Row]:
     """Steps of training, with the sizes for the device and with those for a CPU."""
-    from e2efly.learning.benchmark import training_steps
+    from e2efly.learning.step_rates import training_steps
     from e2efly.runs import presets
 
     for sized in dict.fromkeys((device, "cpu")):

@@ -13,7 +13,7 @@ import dataclasses
 from common import arguments, median, table, write
 
 from e2efly.config import TrainConfig
-from e2efly.learning.benchmark import environment_steps
+from e2efly.learning.step_rates import environment_steps
 from e2efly.runs import presets
 from e2efly.simulation.device import prepare
 from e2efly.tasks.swap import SwapConfig

@@ -16,7 +16,7 @@ from peers import PEERS, physics_steps
 from variants import own, own_parameters, wide
 
 from e2efly.config import EnvConfig
-from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
+from e2efly.learning.step_rates import environment_steps, physics_substeps, training_steps
 from e2efly.runs import presets
 from e2efly.simulation.device import prepare
 

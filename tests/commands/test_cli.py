@@ -36,6 +36,7 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     [
         (["trian"], "unknown command 'trian'; did you mean 'train'?"),
         (["play"], "unknown command 'play'; did you mean 'watch'?"),
+        (["score"], "unknown command 'score'; did you mean 'benchmark'?"),
         (["fyl"], "unknown command 'fyl' (there are: ablate,"),  # never one that moves a real vehicle
         (["list", "reward"], "unknown catalogue 'reward'; did you mean 'rewards'?"),
         (
@@ -216,8 +217,8 @@ def test_a_folder_that_cannot_be_made_is_named(capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["train", "--help"], ["train", "race", "--algo", "bptt", "--help"],
-                                       ["eval", "--help"], ["bench", "--help"], ["render", "--help"],
-                                       ["--version"]])  # fmt: skip
+                                       ["eval", "--help"], ["bench", "--help"], ["benchmark", "--help"],
+                                       ["render", "--help"], ["--version"]])  # fmt: skip
 def test_help_imports_no_jax(arguments: list[str]) -> None:
     code = (
         "import sys; from e2efly.commands.cli import run\n"
@@ -264,6 +265,15 @@ def test_help_is_one_screen_and_names_its_arguments(
     assert "[[" not in said
     assert "{None}" not in said
     assert f"`e2efly {command} --help-all` prints every option in full" in said
+
+
+@pytest.mark.parametrize(("command", "other"), [("bench", "benchmark"), ("benchmark", "bench")])
+def test_two_commands_of_like_names_say_what_the_other_does(
+    command: str, other: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        run([command, "--help"])
+    assert f"(`e2efly {other}` " in capsys.readouterr().out
 
 
 def test_every_option_of_train_has_help() -> None:

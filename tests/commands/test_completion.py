@@ -37,6 +37,8 @@ def test_it_is_a_script_and_knows_every_command(bash: Path) -> None:
         ("e2efly train race --task.tr", ["--task.track"]),  # an option of a task that is not the usual one
         ("e2efly train hover --algo pp", ["ppo"]),
         ("e2efly train hover --vehicle craz", ["crazyflie"]),
+        ("e2efly benchmark any/tr", ["any/track"]),
+        ("e2efly benchmark hover --base", ["--baseline"]),
         ("e2efly watch any/ho", ["any/hover", "any/hover_rotors"]),
         ("e2efly render forest --camera fp", ["fpv"]),
         ("e2efly fly-report x.mcap --ou", ["--out"]),

@@ -56,6 +56,13 @@ def test_the_figures_are_what_was_measured_and_say_by_which_preset() -> None:
     assert figures.TITLES.keys() == figures.POLICIES.keys()
 
 
+def test_the_page_of_the_scores_is_what_was_measured_by_todays_benchmark() -> None:
+    page = script("scorecards_page")
+    assert (DOCS / "benchmark.md").read_text(encoding="utf-8") == page.page()
+    measured = json.loads(page.RESULTS.read_text(encoding="utf-8"))
+    assert (measured["seed"], measured["version"]) == (page.SEED, page.VERSION)
+
+
 def test_the_page_of_the_physics_has_what_the_rate_loop_was_measured_to_cost() -> None:
     page, measured = (DOCS / "physics.md").read_text(encoding="utf-8"), script("figures").results("rate_loop")
     held, one, four = measured["table"]

@@ -13,7 +13,7 @@ from e2efly.simulation.device import cores, prepare, processor
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure this machine: physics sub-steps per second, environment steps per second, training steps per second."""
+    """Measure this machine: physics, environment and training steps a second. (`e2efly benchmark` scores policies.)"""
 
     json: Path | None = None
     """Write the figures to this file."""
@@ -42,7 +42,7 @@ def measure() -> dict[str, float]:
     """Steps per second, by kind of step: the best of several runs after compilation."""
     import jax
 
-    from e2efly.learning.benchmark import environment_steps, physics_substeps, training_steps
+    from e2efly.learning.step_rates import environment_steps, physics_substeps, training_steps
     from e2efly.runs import presets
 
     def training(algo: str) -> float:

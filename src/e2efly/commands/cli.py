@@ -17,6 +17,7 @@ _EXAMPLES = {
     "train hover": "learn to hover, evaluate, export policy.onnx",
     "train race --algo bptt": "another task, another algorithm",
     "eval runs/hover-bptt-0": "fly a policy from 1000 unseen starts, draw plots",
+    "benchmark POLICY": "a card of anybody's policy: latency, stress, plants, from starts of its own",
     "watch hover": "fly a policy in a browser: drag its goal, throw it, change the wind",
     "ablate hover": "what each reward term is good for: a figure and a table",
     "sweep hover --seeds 5": "over seeds and options, side by side on Ray",
@@ -36,7 +37,7 @@ _EXAMPLES = {
     "render forest": "what cameras and LiDARs see of a world: pictures and a video",
     "firmware": "build the real Betaflight firmware for this machine",
     "airsim-settings VEHICLE": "AirSim's settings.json for a vehicle",
-    "bench": "how fast this machine simulates and learns",
+    "bench": "how fast this machine simulates and learns (scores of policies: benchmark)",
     "completion bash": "a script with which bash or zsh completes what you type",
     "list": "tasks, vehicles, presets, algorithms; `list zoo`, `list rewards`, ... in full",
 }
@@ -48,7 +49,8 @@ _SYSTEMS = {"fly": ("linux",), "hil": ("linux",), "firmware": ("linux",), "sweep
 """Operating systems on which a command runs, as `sys.platform` names them. The others run on every one."""
 _MEANT = {
     "watch": ("play", "show", "view", "demo", "run", "simulate", "visualize"),
-    "eval": ("test", "evaluate", "score"),
+    "eval": ("test", "evaluate"),
+    "benchmark": ("score", "rate", "card"),
     "train": ("learn", "fit"),
     "render": ("draw", "picture"),
 }

@@ -76,7 +76,7 @@ _NAMED = {"--algo": (*ALGORITHMS,), "--preset": (*presets.names(),), "--vehicle"
 """Names that options accept, which say only that they accept a text."""
 _FIRST = {
     **dict.fromkeys(("train", "sweep", "ablate"), (*TASKS,)),
-    **dict.fromkeys(("eval", "watch", "export", "render", "validate", "fly", "hil"), (*zoo.names(),)),
+    **dict.fromkeys(("eval", "benchmark", "watch", "export", "render", "validate", "fly", "hil"), (*zoo.names(),)),
     "completion": get_args(Shell),
 }
 """Names that commands accept as their first argument, beside files."""

@@ -238,7 +238,7 @@ def trace(
     return jax.tree.map(lambda *x: np.stack(x), *rows)
 
 
-def wilson(successes: int, n: int, z: float = 1.96) -> tuple[float, float]:
+def wilson(successes: float, n: int, z: float = 1.96) -> tuple[float, float]:
     """Wilson's score interval of a success rate. With z = 1.96 it contains the true rate in 95 % of cases.
 
     Raises:

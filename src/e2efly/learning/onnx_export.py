@@ -156,8 +156,9 @@ def export_policy(path: Path, weights: Weights, actor: Actor, contract: Contract
     write_policy(path, graph, contract)
 
 
-def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None:
-    """Write a graph with its contract and its digest, atomically.
+def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract, trusted: bool = True) -> None:
+    """Write a graph with its contract and its digest, atomically. One that is not `trusted`, as it holds nodes of
+    another program, is tried in a process of its own when it is first loaded.
 
     Raises:
         ValueError: for a graph that ONNX refuses.
@@ -173,7 +174,8 @@ def write_policy(path: Path, graph: onnx.GraphProto, contract: Contract) -> None
     helper.set_model_props(model, {METADATA_KEY: contract.to_json()})
     onnx.checker.check_model(model, full_check=True)
     content = sealed(model.SerializeToString())
-    remember(content)
+    if trusted:
+        remember(content)
     write_atomically(Path(path), content)
 
 

@@ -17,7 +17,7 @@ _R_WORLD_BODY = ("-yy-zz", "+xy-wz", "+xz+wy", "+xy+wz", "-xx-zz", "+yz-wx", "+x
 """(R_world_body - identity) / 2, row by row, as sums of products of quaternion entries."""
 
 
-class _Graph:
+class Graph:
     """Collects the nodes and the constants of a graph."""
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
         actor: features, encoders, GRU and head.
         images: the name of each camera's input.
     """
-    graph, features, units = _Graph(), actor.features, actor.network.recurrent
+    graph, features, units = Graph(), actor.features, actor.network.recurrent
     operator = OPERATORS[actor.network.activation]
     _of_state(graph, features)
     seen = zip(images, features.views, weights.encoders, strict=True)
@@ -100,7 +100,7 @@ def perceptron_graph(
             input is clipped.
         most: its actions are clipped to [-most, most], at most to [-1, 1].
     """
-    graph, source = _Graph(), INPUT
+    graph, source = Graph(), INPUT
     if not raw:
         _of_state(graph, features)
         source = "features"
@@ -113,7 +113,7 @@ def perceptron_graph(
     return graph.whole({INPUT: (sum(field.size for field in features.fields),)}, {OUTPUT: (len(layers[-1][1]),)})
 
 
-def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str) -> str:
+def _encoded(graph: Graph, name: str, view: View, layers: Layers, operator: str) -> str:
     """Add the encoder of an image (see `View`), with the channels before the rows, as ONNX requires."""
     c = view.camera
 
@@ -161,7 +161,7 @@ def _encoded(graph: _Graph, name: str, view: View, layers: Layers, operator: str
     return graph.layers(rest, flat, [operator] * len(rest), at("seen"), f"{name}_")
 
 
-def _remembered(graph: _Graph, cell: Gru, source: str) -> str:
+def _remembered(graph: Graph, cell: Gru, source: str) -> str:
     """Add the next memory: `Gru`, gate by gate. ONNX's own GRU operator crashes the process for an empty batch."""
     names = {f"gru_{name}": value for name, value in vars(cell).items()}
     weight, recurrent, bias, recurrent_bias = (graph.constant(name, value) for name, value in names.items())
@@ -180,7 +180,7 @@ def _remembered(graph: _Graph, cell: Gru, source: str) -> str:
     return graph.node("Add", ["candidate", graph.node("Mul", ["update", change], "kept")], NEXT_MEMORY)
 
 
-def _of_state(graph: _Graph, features: Features) -> None:
+def _of_state(graph: Graph, features: Features) -> None:
     """Add the computation of `features` from `observation`, see `Features.of_state`."""
     starts = np.cumsum([0, *(field.size for field in features.fields)])
     columns = [(field, list(range(a, a + field.size))) for field, a in zip(features.fields, starts, strict=False)]
@@ -193,37 +193,51 @@ def _of_state(graph: _Graph, features: Features) -> None:
     order = [place[i] for _, where in columns for i in where if i in place]
     scale = [1.0 if f.frame == "world_body" else f.scale for f, where in columns for i in where if i in place]
 
+    rotation(graph, attitude)
+    for name, index in (("up_index", [6, 7, 8]), ("rest_index", rest), ("order", order)):
+        graph.constant(name, np.array(index, np.int64))
+    graph.constant("scale", np.array(scale, np.float32))
+    graph.node("Gather", ["R_flat", "up_index"], "up", axis=1)
+    turned(graph, vectors)
+    graph.node("Gather", [INPUT, "rest_index"], "rest", axis=1)
+    graph.node("Concat", ["turned", "up", "rest"], "parts", axis=1)
+    graph.node("Gather", ["parts", "order"], "ordered", axis=1)
+    graph.node("Div", ["ordered", "scale"], "features")
+
+
+def rotation(graph: Graph, attitude: int) -> str:
+    """Add `R_flat`, (n, 9): the rotation from body to world, row by row, of the quaternion that begins in a column of
+    the observation.
+    """
     table = np.zeros((len(_PAIRS), 9), np.float32)
     for entry, terms in enumerate(_R_WORLD_BODY):
         for sign, pair in ((terms[0], terms[1:3]), (terms[3], terms[4:6])):
             table[_PAIRS.index(pair), entry] = 2.0 if sign == "+" else -2.0
-    first, second = ([attitude + "wxyz".index(pair[i]) for pair in _PAIRS] for i in (0, 1))
+    for name, i in (("first_index", 0), ("second_index", 1)):
+        columns = [attitude + "wxyz".index(pair[i]) for pair in _PAIRS]
+        graph.constant(name, np.array(columns, np.int64))
+    graph.constant("table", table)
+    graph.constant("identity", np.eye(3, dtype=np.float32).reshape(9))
+    graph.node("Gather", [INPUT, "first_index"], "first", axis=1)
+    graph.node("Gather", [INPUT, "second_index"], "second", axis=1)
+    graph.node("Mul", ["first", "second"], "products")
+    return graph.node("Gemm", ["products", "table", "identity"], "R_flat")
+
+
+def turned(graph: Graph, vectors: list[int]) -> str:
+    """Add `turned`: vectors of the world in these columns of the observation, three for each, in the axes of the body.
+    It needs `rotation`.
+    """
     for name, index in (
-        ("first_index", first),
-        ("second_index", second),
-        ("up_index", [6, 7, 8]),
         ("vectors_index", vectors),
-        ("rest_index", rest),
-        ("order", order),
         ("matrix_shape", [0, 3, 3]),  # 0: as it is
         ("vectors_shape", [0, len(vectors) // 3, 3]),
         ("flat_shape", [0, len(vectors)]),
     ):
         graph.constant(name, np.array(index, np.int64))
-    for name, value in (("table", table), ("identity", np.eye(3).reshape(9)), ("scale", scale)):
-        graph.constant(name, np.array(value, np.float32))
-    graph.node("Gather", [INPUT, "first_index"], "first", axis=1)
-    graph.node("Gather", [INPUT, "second_index"], "second", axis=1)
-    graph.node("Mul", ["first", "second"], "products")
-    graph.node("Gemm", ["products", "table", "identity"], "R_flat")
-    graph.node("Gather", ["R_flat", "up_index"], "up", axis=1)
     graph.node("Reshape", ["R_flat", "matrix_shape"], "R_world_body")
     graph.node("Gather", [INPUT, "vectors_index"], "vectors_flat", axis=1)
     graph.node("Reshape", ["vectors_flat", "vectors_shape"], "vectors_world")
     # vectors are rows: v^T R_world_body is R_body_world v
     graph.node("MatMul", ["vectors_world", "R_world_body"], "vectors_body")
-    graph.node("Reshape", ["vectors_body", "flat_shape"], "turned")
-    graph.node("Gather", [INPUT, "rest_index"], "rest", axis=1)
-    graph.node("Concat", ["turned", "up", "rest"], "parts", axis=1)
-    graph.node("Gather", ["parts", "order"], "ordered", axis=1)
-    graph.node("Div", ["ordered", "scale"], "features")
+    return graph.node("Reshape", ["vectors_body", "flat_shape"], "turned")
