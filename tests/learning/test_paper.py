@@ -75,7 +75,7 @@ def run(*words: str, file: Path, runs: Path) -> str:
 
 
 @pytest.mark.whole
-@pytest.mark.parametrize("name", WITH_RUNS)
+@pytest.mark.parametrize("name", ["ablation", "landing", "learning", "racing"])  # of the others, the options below
 def test_the_short_version_of_an_experiment_gives_rows_and_verdicts(name: str, folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "paper.json"
     told = run(name, file=file, runs=folder)

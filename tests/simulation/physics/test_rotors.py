@@ -118,8 +118,7 @@ def _hovers(vehicle: Vehicle, mode: str) -> None:
     np.testing.assert_allclose(end.position, [0.0, 0.0, 2.0], atol=1e-5 if at_rest else 0.4)
 
 
-@pytest.mark.parametrize("mode", ["ctbr", "rotor_share"])
-@pytest.mark.parametrize("frame", ["hexacopter", "tilted and lopsided octocopter"])
+@pytest.mark.parametrize(("frame", "mode"), [("hexacopter", "rotor_share"), ("tilted and lopsided octocopter", "ctbr")])
 def test_gradients_of_a_step(frame: str, mode: str) -> None:
     """By state and command, in flight and where rotors saturate, against central differences."""
     vehicle, rng = FRAMES[frame](), np.random.default_rng(3)
