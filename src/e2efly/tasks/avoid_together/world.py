@@ -32,6 +32,8 @@ class AvoidTogetherWorld(AvoidWorld):
     """Whether the vehicle is past the end of the forest. What happens to it there does not count."""
     clean: Bool[jax.Array, " n"]
     """Whether no vehicle of the world has touched anything, or left the lane."""
+    beside: Float[jax.Array, " n"]
+    """How far to the left of the lane's middle the vehicle started, m."""
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
@@ -63,7 +65,13 @@ class AvoidTogether(Avoid):
         free_of = jnp.all(away - trees.size[:, None, :, 0] > c.forest.clear, axis=1)
         trees = dataclasses.replace(trees, active=trees.active & free_of)
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
-        return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no)
+        return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no, y)
+
+    def goal(self, memory: Any, time: Float[jax.Array, " n"]) -> Float[jax.Array, "n 3"]:
+        """A point of each vehicle's own behind the end of the forest, straight ahead of its start: their ways do not
+        run together. In flight the lane of each begins where it starts.
+        """
+        return super().goal(memory, time).at[:, 1].add(memory.beside)
 
     def others(self, memory: Any) -> Others:
         """All others of the world."""
