@@ -16,6 +16,7 @@ from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks import company
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
 from e2efly.tasks.avoid_together import AvoidTogetherConfig
+from e2efly.tasks.avoid_together.goal import AvoidTogetherGoal
 from e2efly.tasks.task import Flier, struck
 
 
@@ -38,7 +39,7 @@ class AvoidTogetherWorld(AvoidWorld):
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
 @dataclass(frozen=True)
-class AvoidTogether(Avoid):
+class AvoidTogether(AvoidTogetherGoal, Avoid):
     """Starts beside each other in front of a random forest."""
 
     config: AvoidTogetherConfig
@@ -66,12 +67,6 @@ class AvoidTogether(Avoid):
         trees = dataclasses.replace(trees, active=trees.active & free_of)
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
         return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no, y)
-
-    def goal(self, memory: Any, time: Float[jax.Array, " n"]) -> Float[jax.Array, "n 3"]:
-        """A point of each vehicle's own behind the end of the forest, straight ahead of its start: their ways do not
-        run together. In flight the lane of each begins where it starts.
-        """
-        return super().goal(memory, time).at[:, 1].add(memory.beside)
 
     def others(self, memory: Any) -> Others:
         """All others of the world."""
