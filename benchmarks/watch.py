@@ -70,7 +70,7 @@ def frames(task: str, count: int, seconds: float, looks: bool) -> float:
     suite = next(iter(found.task.criteria().values()))
     source = Simulation(found.environment(suite), found.flown.body, suite, act_of(found.policy), count)
     server = serve("127.0.0.1", 0, task)
-    panel = Panel(Viewer(server, count))
+    panel = Panel(Viewer(server))
     hands_on(panel, source)
     shown, show = [0], panel.viewer.show
 

@@ -83,12 +83,14 @@ def smaller(large: Path, path: Path) -> None:
 
 
 def video(env: Env, suite: TaskConfig, key: Any, flights: Flights, path: Path) -> None:
-    """The first flight that succeeds, as an animated WebP."""
+    """The first flight that succeeds, with all vehicles of its world, as an animated WebP."""
     row = int(np.argmax(flights.success))
     state = env.reset(key, len(flights.length))[0]
-    begin = jax.tree.map(lambda x: np.asarray(x[row]), state.vehicle)
     drawn, _ = moment(env, suite, state, row)
-    recording = Recording([flight_of("", begin, flights, row)], drawn.vehicle, drawn)
+    world = range(row, row + env.agents)
+    begins = [jax.tree.map(lambda x, i=i: np.asarray(x[i]), state.vehicle) for i in world]
+    flown = [flight_of("", begin, flights, i) for begin, i in zip(begins, world, strict=True)]
+    recording = Recording(flown, drawn.vehicle, drawn, env.agents)
     seconds = min(recording.length * recording.period, LONGEST)
     shots = [Image.fromarray(shot) for shot in film(recording, seconds, 1 / PERIOD, size=FILM)]
     shots[0].save(

@@ -16,5 +16,6 @@ VALUES: dict[str, Any] = {
     "speed_per_volt": 0.9,
     "rotor_speed_ceiling": [3600.0, 3500.0, 3400.0, 3300.0],
     "rotor_axis": [[0.08, 0.06, 0.995], [-0.06, 0.08, 0.995], [0.06, -0.08, 0.995], [-0.08, -0.06, 0.995]],
+    "inflow_loss": 60.0,
 }
 """Of the size that a vehicle like the VIS-R has."""

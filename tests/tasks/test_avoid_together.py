@@ -54,6 +54,15 @@ def test_a_world_has_one_forest_and_its_vehicles_start_apart() -> None:
     assert (away - np.asarray(memory.trees.size)[..., 0])[np.asarray(memory.trees.active)].min() > 1.9
 
 
+def test_ways_through_the_forest_run_beside_each_other() -> None:
+    task = make(agents=3)
+    state, memory = task.start(random_key(1), 30)
+    along = dataclasses.replace(state, position=state.position.at[:, 0].add(35.0))
+    for where in (state, along):
+        wanted = np.asarray(task.observe(memory, jnp.zeros(30), where))[:, :2]
+        np.testing.assert_allclose(wanted, np.stack([memory.speed, np.zeros(30)], axis=-1), atol=1e-5)
+
+
 def test_a_touch_ends_the_world_and_no_other() -> None:
     task = make(agents=2)
     memory = without_trees(task, 4)

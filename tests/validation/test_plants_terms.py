@@ -24,6 +24,7 @@ TERMS: dict[str, dict[str, Any]] = {
     "rate loop": {"rate_integral_gain": [60.0, 50.0, 20.0], "gyro_time_constant": 0.004},
     "battery": {"nominal_voltage": 14.8, "battery_voltage": 14.4, "voltage_sag": 0.2, "speed_per_volt": 0.9},
     "ceiling": {"rotor_speed_ceiling": [3000.0, 3300.0, 2800.0, 3600.0]},
+    "inflow loss": {"inflow_loss": 60.0},
     "full inertia": {"inertia_products": [1e-4, -2e-4, 5e-5]},
 }
 """Of the VIS-R's size."""

@@ -21,6 +21,7 @@ TERMS: dict[str, Any] = {
     "nominal_voltage": 14.8,
     "battery_voltage": 14.4,
     "voltage_sag": 0.2,
+    "inflow_loss": 60.0,
 }
 
 

@@ -20,7 +20,7 @@ from e2efly.simulation.scenes.scene import Scene, Solids, distances
 from e2efly.tasks.hover import HoverConfig
 from e2efly.viewing import plots
 from e2efly.viewing.seen import plot_seen
-from e2efly.viewing.style import figure
+from e2efly.viewing.style import START, figure
 from e2efly.viewing.worlds import draw_plan, plot_flights_in_worlds
 from tests.viewing.test_plots import STEPS, check_png, flights
 
@@ -32,6 +32,20 @@ AREA = {
     "box": 4 * 0.5 * 0.3, "sphere": np.pi * 0.36, "cylinder": np.pi * 0.16, "capsule": np.pi * 0.09,
     "gate": 4 * 0.6 * 0.05, "pad": np.pi * 0.25,
 }  # fmt: skip
+
+
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures of worlds that are drawn from now on."""
+    drawn: list[Figure] = []
+
+    @contextmanager
+    def kept(*args: Any, **kwargs: Any) -> Iterator[Figure]:
+        with figure(*args, **kwargs) as fig:
+            drawn.append(fig)
+            yield fig
+
+    monkeypatch.setattr("e2efly.viewing.worlds.figure", kept)
+    return drawn
 
 
 def one(kind: str) -> Scene:
@@ -94,19 +108,22 @@ def test_flights_without_success_come_first_and_goals_are_numbered(
     steps = np.arange(len(flown.time))[:, None, None]
     goals = np.where(steps < 5, [1.0, 0.0, 2.0], [0.0, 4.0, 2.0]) + np.zeros((1, 4, 1))
     flown = dataclasses.replace(flown, goal=goals, late=np.array([False, False, False, True]))
-    drawn: list[Figure] = []
-
-    @contextmanager
-    def kept(*args: Any, **kwargs: Any) -> Iterator[Figure]:
-        with figure(*args, **kwargs) as fig:
-            drawn.append(fig)
-            yield fig
-
-    monkeypatch.setattr("e2efly.viewing.worlds.figure", kept)
+    drawn = figures(monkeypatch)
     plot_flights_in_worlds(flown, one("box"), tmp_path / "worlds.png", "race", 2)
     plans = [ax for ax in drawn[0].axes if ax.get_title(loc="left")]
     assert [ax.get_title(loc="left").split(",")[0] for ax in plans] == ["out of time", "success"]
     assert {text.get_text() for text in plans[0].texts} == {"1", "2"}
+
+
+def test_vehicles_of_a_world_are_drawn_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = dataclasses.replace(flights(6), agents=2)
+    flown.success[2:4] = False
+    drawn = figures(monkeypatch)
+    plot_flights_in_worlds(flown, one("box"), tmp_path / "worlds.png", "avoid_together")
+    plans = [ax for ax in drawn[0].axes if ax.get_title(loc="left")]
+    assert [ax.get_title(loc="left").split(",")[0] for ax in plans] == ["no success", "success", "success"]
+    starts = [[line.get_xydata()[0] for line in ax.lines if line.get_marker() == START["marker"]] for ax in plans]
+    np.testing.assert_allclose(starts, flown.position[0, [2, 3, 0, 1, 4, 5], :2].reshape(3, 2, 2))
 
 
 def test_what_the_cameras_saw(tmp_path: Path) -> None:

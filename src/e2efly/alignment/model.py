@@ -14,7 +14,7 @@ from e2efly.alignment.windows import STEP, past_steps
 from e2efly.control import COMMAND_MODES, Vec3
 from e2efly.control.vectors import Quat
 from e2efly.simulation.physics.airframe import Airframe
-from e2efly.simulation.physics.body import drag, rotor_speed_for, rotor_thrust, rotor_wrench
+from e2efly.simulation.physics.body import drag, met, rotor_speed_for, rotor_thrust, rotor_wrench
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import INTEGRATORS, ahead
 from e2efly.simulation.physics.mixer import Mixer
@@ -336,7 +336,7 @@ def _sensed(plant: Airframe, parts: Parts, q: Array, earlier: Array | None = Non
     """The simulated sensor readings. The accelerometer passes its filter if the earlier rotor speeds, (past, 4), are
     known.
     """
-    collective, _ = rotor_wrench(plant, rotor_thrust(plant, parts.rotor_speed))
+    collective, _ = rotor_wrench(plant, met(plant, rotor_thrust(plant, parts.rotor_speed), parts, None))
     felt = collective
     if earlier is not None:
         before, _ = rotor_wrench(plant, rotor_thrust(plant, split(earlier)))

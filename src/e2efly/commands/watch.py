@@ -56,7 +56,7 @@ class WatchOptions:
     criterion: str | None = None
     """Criterion of the task. If omitted, the first one."""
     count: int = 1
-    """Number of vehicles that fly at once."""
+    """Number of vehicles that fly at once, or a few more for whole worlds of several."""
     seed: int = 0
     """Seed of the starts."""
     host: str = "127.0.0.1"
@@ -142,16 +142,17 @@ def _serve(o: WatchOptions, server: Any, logs: list[Path], ready: Callable[[], N
         return time.monotonic() > end or (o.idle and _abandoned())
 
     report = _report(o.what)
-    count = len(logs) or (2 if report else o.count)
-    panel = Panel(Viewer(server, count, ghosts=count > 1 and bool(logs or report)))
     if logs or report:
         recording, starts = _reported(o, report) if report else (_recording(o, logs), ())
+        panel = Panel(Viewer(server, recording.together))
+        panel.choose_among(len(recording.flights))
         if starts:
             starts_on(panel, recording, starts)
         between = times_on(panel, recording)
         ready()
         loop(recording, panel.viewer, panel, over, between)
         return
+    panel = Panel(Viewer(server))
     if _is_source(o.what[0]):
         with _poses(o) as poses:
             ready()
@@ -166,6 +167,7 @@ def _serve(o: WatchOptions, server: Any, logs: list[Path], ready: Callable[[], N
     simulation, progress = _flown(o, Terminal())
     if not may_wait:
         ready()
+    panel.choose_among(simulation.count)
     hands_on(panel, simulation)
     between = (lambda: None) if progress is None else policies_on(panel, progress)
     loop(simulation, panel.viewer, panel, over, between, watched)
@@ -269,7 +271,7 @@ def _reported(o: WatchOptions, report: Path) -> "tuple[Recording, list[ShownRepo
     criterion = _criterion(o.criterion, dict.fromkeys(start.criterion for start in starts))
     first = next(start for start in starts if start.criterion == criterion)
     starts.sort(key=lambda start: start.criterion != criterion)
-    return Recording(first.flights, vehicle, first.stage), starts
+    return Recording(first.flights, vehicle, first.stage, first.together), starts
 
 
 def _flown(o: WatchOptions, console: Terminal) -> "tuple[Simulation, ShownProgress | None]":

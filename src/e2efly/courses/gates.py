@@ -37,6 +37,8 @@ class Gates:
     """(g,) or (n, g) sine of each yaw."""
     half: Any
     """(g, 2) or (n, g, 2) half of the opening's width and height, m."""
+    moved: Any = None
+    """(n, g + 1, 3) by how much the centres have moved in the step that is judged, world, m. None: not at all."""
 
     @staticmethod
     def of(track: RaceTrack) -> "Gates":
@@ -53,15 +55,16 @@ class Gates:
         """Number of gates of the track."""
         return self.cos.shape[-1]
 
-    def local(self, point: Any) -> tuple[Any, Any, Any]:
-        """Coordinates of points (n, 3) in every gate's frame, each (n, g)."""
+    def local(self, point: Any, moved: Any = None) -> tuple[Any, Any, Any]:
+        """Coordinates of points (n, 3) in every gate's frame, each (n, g), before the gates have moved by so much."""
         xp = point.__array_namespace__()
         d = point[:, None] - self.position[..., :-1, :]
+        d = d if moved is None else d + moved[:, :-1]
         x, y, cos, sin = d[..., 0], d[..., 1], xp.asarray(self.cos), xp.asarray(self.sin)
         return cos * x + sin * y, cos * y - sin * x, d[..., 2]
 
     def judge(self, index: Any, before: Any, after: Any, radius: Any) -> tuple[Any, Any, Any]:
-        """Judge steps along straight lines.
+        """Judge steps along straight lines. Gates that have moved did so along straight lines, too.
 
         Args:
             index: (n,) the next gate of each vehicle, counted from 0 within a lap.
@@ -73,7 +76,7 @@ class Gates:
             Booleans (n,): the next gate was passed; its plane was crossed forward elsewhere; a frame was touched.
         """
         xp = before.__array_namespace__()
-        x0, y0, z0 = self.local(before)
+        x0, y0, z0 = self.local(before, self.moved)
         x1, y1, z1 = self.local(after)
         t = x0 / xp.where(x0 == x1, 1.0, x0 - x1)
         y, z = xp.abs(y0 + t * (y1 - y0)), xp.abs(z0 + t * (z1 - z0))

@@ -133,6 +133,8 @@ class Vehicle:
     it."""
     rotor_axis: Any = _term("1", (4, 3), per_rotor=(3,))
     """Unit vector along which each rotor pushes, (N, 3). If left out, all push along body z."""
+    inflow_loss: Any = _term("rad/m", at_least=0.0)
+    """Share of its thrust that a rotor loses, divided by the ratio of axial inflow velocity to rotor speed."""
     mixer: str = field(default="", metadata={"static": True})
     """A `MixerRule`. Empty: `shift` with four rotors, `qp` with more."""
 

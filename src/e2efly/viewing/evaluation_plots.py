@@ -68,14 +68,15 @@ def plot_run(run: RunDirectory, setup: Setup, flown: dict[str, Episodes]) -> Non
 
 def _flights(flights: Flights, suite: Any, env: Env, key: Any, folder: Path, name: str, title: str, note: str) -> None:
     if env.cameras or suite.own_worlds:  # every flight has a world of its own
-        begun = jax.jit(Env.reset, static_argnums=2)(env, key, DRAWN)[0]
+        begun = jax.jit(Env.reset, static_argnums=2)(env, key, len(flights.length))[0]
         scene = env.task.scene(begun.memory)
         plot_flights_in_worlds(flights, scene, folder / f"flights_{name}.png", title, notes=[note])
         if env.cameras:
             plot_seen(flights, env.cameras, folder / f"seen_{name}.png", title)
     else:
         course = "".join(f", {key} {value}" for key, value in suite.course().items() if isinstance(value, str))
-        shown = f"{note}, {len(flights.length)} episodes{course}"
+        worlds = f" in {len(flights.length) // env.agents} worlds, drawn over each other" if env.agents > 1 else ""
+        shown = f"{note}, {len(flights.length)} episodes{worlds}{course}"
         plots.plot_flights(suite, flights, folder / f"flights_{name}.png", title, notes=[shown])
     worst = int(np.argmin(flights.success))  # the first failed flight, or else the first flight
     plots.plot_time(flights, worst, folder / f"time_{name}.png", title, env.physics.nominal)

@@ -39,6 +39,8 @@ class Flights:
     """The command mode of `command`, a name of `e2efly.control.COMMAND_MODES`."""
     late: Bool[np.ndarray, " n"] | None = None
     """Whether the episode timed out. None: not known."""
+    agents: int = 1
+    """Number of vehicles in a world. Those of a world are next to each other."""
     images: tuple[np.ndarray, ...] = ()
     """The images that the policy saw at the start of each step, by camera: (t, n, h, w) or (t, n, h, w, 3)."""
 
@@ -95,5 +97,6 @@ def fly(env: Env, act: Act, key: PRNGKeyArray, n: int, steps: int) -> Flights:
         success=success[length - 1, np.arange(n)],
         command_mode=env.physics.command_mode,
         images=tuple(np.stack(of) for of in zip(*shown, strict=True)),
+        agents=env.agents,
         late=~np.asarray(out.terminated)[length - 1, np.arange(n)],
     )

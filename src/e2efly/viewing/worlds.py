@@ -58,47 +58,53 @@ def plot_flights_in_worlds(
     flights: Flights, scene: Scene, path: str | Path, title: str, count: int = 6, notes: Sequence[str] = ()
 ) -> None:
     """Draw flights, each in its own world as it was at the end of the flight, coloured by speed: from above with the
-    heading at some times, and the height over the distance flown.
+    heading at some times, and the height over the distance flown. Vehicles of the same world are drawn together.
 
     Args:
         flights: n episodes.
         scene: n worlds, one for each episode, or one world for all.
         path: the PNG file.
         title: title of the figure.
-        count: number of flights, failed ones first.
+        count: number of worlds, failed ones first.
         notes: lines under the title.
     """
-    order = np.argsort(flights.success, kind="stable")
-    shown = [int(i) for i in order if flights.length[i] > 0][:count]
+    a = flights.agents
+    order = a * np.argsort(flights.success[::a], kind="stable")
+    shown = [int(i) for i in order if flights.length[i] > 0][:count]  # of each world its first vehicle
     worlds = [bodies(scene, i if scene.worlds > 1 else 0, float(flights.time[flights.length[i] - 1])) for i in shown]
-    tracks = [flights.position[: flights.length[i], i] for i in shown]
+    tracks = [flights.position[: flights.length[i], i + j] for i in shown for j in range(a)]
     low, high = _bounds(tracks, worlds)
     size = high - low
     columns = max(1, min(len(shown), 3, round(math.sqrt(1.5 * len(shown) * size[1] / size[0]))))
     rows = max(1, math.ceil(len(shown) / columns))
     panel = max((WIDTH - 1.6) / columns * size[1] / size[0], 0.5)
     height = min(max(rows * (panel + 1.35) + 1.3, 4.5), 10.8)
-    fastest = max((flights.speed[: flights.length[i], i].max() for i in shown), default=0.0)
+    fastest = max((flights.speed[: flights.length[i], i : i + a].max() for i in shown), default=0.0)
     norm = Normalize(0.0, max(float(fastest), 0.1))
     top = max((float(np.nanmax(track[:, 2])) for track in tracks), default=1.0)
-    number = f"{len(shown)} of {len(flights.length)} flights, each in its own world"
+    number = f"{len(shown)} of {len(flights.length) // a} flights, each in its own world"
+    number += f" with {a} vehicles" if a > 1 else ""
     with figure(path, title, height, [*notes, f"{number}, from above and by their height"]) as fig:
         axes = fig.subplots(2 * rows, columns, squeeze=False, height_ratios=[panel, 0.55] * rows)
-        for k, (i, world, track) in enumerate(zip(shown, worlds, tracks, strict=True)):
+        for k, (i, world) in enumerate(zip(shown, worlds, strict=True)):
             plan, side = axes[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]
             draw_plan(plan, world)
-            _path(plan, track[:, :2], flights.speed[: len(track), i], norm)
-            _headings(plan, track, flights.quaternion[: len(track), i], 0.025 * float(size.max()))
-            way = np.insert(np.cumsum(np.linalg.norm(np.diff(track, axis=0), axis=1)), 0, 0.0)
-            _path(side, np.stack([way, track[:, 2]], axis=1), flights.speed[: len(track), i], norm)
-            _goals(plan, side, flights.goal[: len(track), i], way)
-            plan.plot(*track[0, :2, None], **START, zorder=4)
-            if not flights.success[i]:
-                plan.plot(*track[-1, :2, None], **FAILURE, zorder=5)
-            ended = f"{flights.ending(i)}, {flights.time[len(track) - 1]:.1f} s"
-            plan.set_title(f"{ended}, top {flights.speed[: len(track), i].max():.1f} m/s", size=9)
+            until, longest = flights.length[i], 0.1
+            for row in range(i, i + a):
+                track, speed = flights.position[:until, row], flights.speed[:until, row]
+                _path(plan, track[:, :2], speed, norm)
+                _headings(plan, track, flights.quaternion[:until, row], 0.025 * float(size.max()))
+                way = np.insert(np.cumsum(np.linalg.norm(np.diff(track, axis=0), axis=1)), 0, 0.0)
+                _path(side, np.stack([way, track[:, 2]], axis=1), speed, norm)
+                _goals(plan, side, flights.goal[:until, row], way)
+                plan.plot(*track[0, :2, None], **START, zorder=4)
+                if not flights.success[row]:
+                    plan.plot(*track[-1, :2, None], **FAILURE, zorder=5)
+                longest = max(longest, way[-1])
+            ended = f"{flights.ending(i)}, {flights.time[until - 1]:.1f} s"
+            plan.set_title(f"{ended}, top {flights.speed[:until, i : i + a].max():.1f} m/s", size=9)
             plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-            side.set(xlim=(0, max(way[-1], 0.1)), ylim=(0, 1.15 * max(top, 0.5)), xlabel="flown (m)")
+            side.set(xlim=(0, longest), ylim=(0, 1.15 * max(top, 0.5)), xlabel="flown (m)")
             for ax in (plan, side):
                 ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
                 ax.yaxis.set_major_locator(MaxNLocator(5 if ax is plan else 2, steps=[1, 2, 5, 10]))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import label
 
 from e2efly.commands.cli import run
 from e2efly.flight.pose.sources import open_source
@@ -86,6 +87,19 @@ def test_the_vehicle_is_large_and_its_goal_does_not_cover_it(name: str) -> None:
     assert np.ptp(np.nonzero(vehicle)[1]) > 640 / 8
     assert (alone[vehicle] == there[vehicle]).all(axis=1).mean() > 0.95
     assert (alone != there).any()
+
+
+def test_a_picture_shows_every_vehicle_of_a_world_wherever_they_are() -> None:
+    here = np.array([[0, 0, 2.0], [-6.0, 1.0, 3.0], [4.0, 9.0, 2.0], [0.5, -3.0, 0.4]])
+    level, still = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1)), np.zeros((4, 3))
+
+    def seen(together: int) -> int:
+        frame = StageFrame(0.0, here, level, still, np.zeros((4, 4)), together=together)
+        shot = snapshot(Stage(load_vehicle("vis_r"), ground=False), frame)
+        return int(label((shot != shot[0, 0]).any(axis=2), np.ones((3, 3)))[1])
+
+    assert seen(4) == 4
+    assert seen(1) < 4  # a camera close to the first does not see who is behind it
 
 
 def test_a_film_of_a_log_is_written(tmp_path: Path) -> None:

@@ -55,6 +55,18 @@ def test_failures_come_first_and_another_start_can_be_chosen(folder: Path) -> No
     assert np.linalg.norm(after.position[0] - before.position[0]) > 1e-3
 
 
+@pytest.mark.whole
+def test_all_vehicles_of_a_world_are_shown(tmp_path: Path) -> None:
+    asked = ["--plant", "mujoco", "--episodes", "4", "--max-drop", "100", "--out", str(tmp_path / "plots")]
+    assert run(["validate", "race_duel", *asked, "--json", str(tmp_path / "report.json")]) == 0
+    starts, _ = read_report(tmp_path / "report.json")
+    assert [(start.together, len(start.flights)) for start in starts] == [(2, 4)] * 2
+    for start in starts:
+        first, second, *ghosts = (flight.position[0] for flight in start.flights)
+        np.testing.assert_allclose(ghosts, [first, second], atol=1e-6)
+        assert np.linalg.norm(first - second) > 0.5
+
+
 def test_a_film_of_a_report(folder: Path) -> None:
     out = folder / "still.png"
     assert run(["watch", str(folder), "--video", str(out), "--seconds", "1"]) == 0

@@ -114,10 +114,23 @@ def test_what_stands_is_drawn_once_per_world() -> None:
     assert isinstance(source.env, Env)
 
 
+def test_a_page_shows_every_vehicle_of_a_world() -> None:
+    race = simulation(1, "race_duel")
+    frame = race.step(0)
+    assert frame.position.shape[0] == frame.together == race.count == 2
+    viewer = Viewer(viser.ViserServer(port=0, verbose=False))
+    viewer.show(race.stage_of(0), race.origin, frame, 0.1)
+    for body in viewer._bodies:
+        assert len(body.batched_colors) == len(body.batched_positions)
+        np.testing.assert_allclose(body.batched_positions[:2], frame.position + viewer._offset, atol=1e-5)
+    assert len(viewer._goals) == 2
+    viewer.server.stop()
+
+
 def test_a_load_is_shown_where_it_hangs_and_moves_with_the_world() -> None:
     """The page draws it and its cable; a moved goal takes it along with its vehicle."""
     flown = simulation(task="hover_payload")
-    viewer = Viewer(viser.ViserServer(port=0, verbose=False), 2)
+    viewer = Viewer(viser.ViserServer(port=0, verbose=False))
     for _ in range(2):
         frame = flown.step(0)
         assert frame.load is not None

@@ -120,6 +120,8 @@ class Airframe:
     """Highest speed that each rotor reaches, rad/s."""
     tilt: Tilt | None = None
     """Directions of the rotors. None: all push along body z."""
+    inflow_loss: Array | None = None
+    """Share of the thrust that is lost, divided by the ratio of axial inflow velocity to rotor speed, rad/m."""
     push: tuple[Array, Array] | None = None
     """Acceleration by a force from outside, world, x and y, m/s^2."""
     cable: Cable | None = None
@@ -172,6 +174,7 @@ class Airframe:
             centre=None if v.centre_of_mass is None else Vec3.of(v.centre_of_mass),
             ceiling=None if v.rotor_speed_ceiling is None else split(v.rotor_speed_ceiling),
             tilt=Tilt.of(v),
+            inflow_loss=v.inflow_loss,
             push=None if push is None else (push[..., 0], push[..., 1]),
             cable=None if load is None else Cable.of(load, v, dt),
         )

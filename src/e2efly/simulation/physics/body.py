@@ -15,6 +15,9 @@ from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle, quantities, terms
 from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
+SLOWEST = 1.0
+"""Rotor speed below which the loss of thrust by inflow grows no more, rad/s: such a rotor hardly pushes."""
+
 jax.tree_util.register_dataclass(
     Vehicle, data_fields=[f.name for f in (*quantities(), *terms())], meta_fields=["name", "mixer"]
 )
@@ -27,6 +30,24 @@ def rotor_thrust(plant: Airframe, rotor_speed: Rotors) -> Rotors:
     if plant.rotor_share is None:
         return thrust
     return tuple(f * share for f, share in zip(thrust, plant.rotor_share, strict=True))
+
+
+def met(plant: Airframe, thrust: Rotors, parts: Parts, wind: Vec3 | None) -> Rotors:
+    """Thrust of each rotor in the air that it meets, N, from that in still air, if the plant has an `inflow_loss`.
+
+    A rotor that moves along its axis against the air at v m/s and turns at W rad/s keeps the share 1 - `inflow_loss`
+    v / W, never less than nothing. The turning of the body moves its rotors, too; heights of rotors are not counted.
+    """
+    if plant.inflow_loss is None:
+        return thrust
+    air, rate = air_velocity(parts.attitude, parts.velocity, wind), parts.body_rate
+    axes = None if plant.tilt is None else zip(*plant.tilt.axis, strict=True)
+    moving = [air + rate.cross(Vec3(x, y, 0.0 * x)) for x, y in zip(plant.arm_x, plant.arm_y, strict=True)]
+    inflow = [v.z for v in moving] if axes is None else [v.dot(Vec3(*a)) for v, a in zip(moving, axes, strict=True)]
+    return tuple(
+        f * jnp.maximum(1.0 - plant.inflow_loss * v / jnp.maximum(w, SLOWEST), 0.0)
+        for f, v, w in zip(thrust, inflow, parts.rotor_speed, strict=True)
+    )
 
 
 def reached(plant: Airframe, rotor_speed: Rotors, command: Rotors) -> Rotors:
@@ -158,7 +179,7 @@ def accelerations(
     The wind is the velocity of the air in the world, m/s. Accelerations of the rotors, rad/s^2, are required if the
     plant has rotor inertia. The pull is that of the cable (`pulled`), world, N.
     """
-    thrust, tilt = rotor_thrust(plant, parts.rotor_speed), plant.tilt
+    thrust, tilt = met(plant, rotor_thrust(plant, parts.rotor_speed), parts, wind), plant.tilt
     collective, torque = rotor_wrench(plant, thrust)
     if plant.rotor_inertia is not None and rotor_acceleration is not None:
         torque = torque + rotor_momentum_torque(

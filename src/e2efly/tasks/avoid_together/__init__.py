@@ -15,7 +15,7 @@ class AvoidTogetherConfig(AvoidConfig):
     """Fly through a random forest together with others, seen only by a camera."""
 
     world: ClassVar[str] = "e2efly.tasks.avoid_together.world:AvoidTogether"
-    goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
+    goal_class: ClassVar[str] = "e2efly.tasks.avoid_together.goal:AvoidTogetherGoal"
     route: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidRoute"
     paper: ClassVar[Paper | None] = None
 

@@ -16,6 +16,7 @@ from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks import company
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
 from e2efly.tasks.avoid_together import AvoidTogetherConfig
+from e2efly.tasks.avoid_together.goal import AvoidTogetherGoal
 from e2efly.tasks.task import Flier, struck
 
 
@@ -32,11 +33,13 @@ class AvoidTogetherWorld(AvoidWorld):
     """Whether the vehicle is past the end of the forest. What happens to it there does not count."""
     clean: Bool[jax.Array, " n"]
     """Whether no vehicle of the world has touched anything, or left the lane."""
+    beside: Float[jax.Array, " n"]
+    """How far to the left of the lane's middle the vehicle started, m."""
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape"], meta_fields=["control_period", "checks"])
 @dataclass(frozen=True)
-class AvoidTogether(Avoid):
+class AvoidTogether(AvoidTogetherGoal, Avoid):
     """Starts beside each other in front of a random forest."""
 
     config: AvoidTogetherConfig
@@ -63,7 +66,7 @@ class AvoidTogether(Avoid):
         free_of = jnp.all(away - trees.size[:, None, :, 0] > c.forest.clear, axis=1)
         trees = dataclasses.replace(trees, active=trees.active & free_of)
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
-        return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no)
+        return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no, y)
 
     def others(self, memory: Any) -> Others:
         """All others of the world."""

@@ -21,7 +21,7 @@ from e2efly.config import (
     number,
     shape,
 )
-from e2efly.config.domain import Domain, track_domain
+from e2efly.config.domain import Domain, displaced, track_domain
 from e2efly.config.drawing import ORANGE, Face, Mark, Thing
 from e2efly.config.run import OURS, VISFLY
 from e2efly.courses import defaults
@@ -109,10 +109,16 @@ class RaceConfig(TaskConfig):
     """Whether the policy sees what it needs for any track: the next three gates with their axes and openings, and the
     height above the ground. With track any, it always does."""
 
+    swing: float = number(0.0, high=5.0, added=True, sets_shapes=True)
+    """Largest amplitude with which a gate swings sideways, in its own plane, m. Each gate has its own, and its own
+    period and phase, in every episode. 0: the gates stand still (sets shapes)."""
+    swing_period: tuple[float, float] = number((3.0, 8.0), low=0.5, rising=True, added=True)
+    """Shortest and longest period of that, s."""
+
     @property
     def precision(self) -> str:  # type: ignore[override]
         """The time of a lap. On random tracks, which none flies without failures, success and time count together."""
-        return "pace" if self.own_worlds else "duration"
+        return "pace" if self.track == ANY else "duration"
 
     @property
     def any_track(self) -> bool:
@@ -129,13 +135,25 @@ class RaceConfig(TaskConfig):
         return {self.name: dataclasses.replace(self, laps=max(self.laps, 1))}
 
     def domain(self) -> Domain:
-        """The track, or random tracks."""
-        return RACING.domain if self.track == ANY else track_domain(load_track(self.track))
+        """The track with its gates wherever they swing, or random tracks."""
+        if self.track == ANY:
+            return RACING.domain
+        tracks = track_domain(load_track(self.track))
+        return displaced(tracks, self.swing, 0.0) if self.swing else tracks
+
+    def check(self, control_rate: float, feet_height: float) -> None:
+        """Gates swing on tracks that the policy knows."""
+        super().check(control_rate, feet_height)
+        if self.swing and self.any_track:
+            raise ValueError(
+                f"task.swing is {self.swing:g}; accepted: 0 with task.track {ANY} or task.shows_more, whose gates "
+                "stand still"
+            )
 
     @property
     def own_worlds(self) -> bool:
-        """With track any, each episode has its own world."""
-        return self.track == ANY
+        """With track any, and with gates that swing, each episode has its own world."""
+        return self.track == ANY or self.swing > 0
 
     def showing(self, names: Sequence[str]) -> "RaceConfig":
         """For a policy whose observation has the gates' axes: track any, if no other track is named."""

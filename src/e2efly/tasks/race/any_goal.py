@@ -147,7 +147,7 @@ class AnyRaceGoal(Racing):
         tracks, xp = memory.tracks, namespace(memory.passed)
         laps = xp.where(tracks.closed, self.config.laps, 1)
         end = (laps > 0) & (memory.passed + 1 >= laps * tracks.count)
-        passed, outcome = self.verdict(memory, before, after, tracks.gates, memory.index, end, self.fence(memory))
+        passed, outcome = self.verdict(memory, before, after, time, tracks.gates, memory.index, end, self.fence(memory))
         return dataclasses.replace(memory, passed=memory.passed + passed), outcome
 
     def drawn(self, memory: AnyRaceMemory) -> dict[str, Array]:

@@ -22,6 +22,7 @@ from e2efly.policy.observation import Field
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race.any_goal import AnyRaceGoal, AnyRaceMemory
 from e2efly.tasks.race.racing import Racing
+from e2efly.tasks.race.swinging import SwingingMemory, after_step, gates_at, passed_by, rows
 from e2efly.tasks.route import Route
 from e2efly.tasks.verdicts import offsets
 
@@ -31,7 +32,7 @@ CRUISE = 3.0
 
 @dataclass(frozen=True)
 class RaceGoal(Racing):
-    """Fly through gates in order. The task's state is the number of gates passed, (n,)."""
+    """Fly through gates in order. The task's state is the number of gates passed, (n,), or a `SwingingMemory`."""
 
     config: RaceConfig
     shape: Shape
@@ -49,20 +50,25 @@ class RaceGoal(Racing):
         """Number of gates of the track."""
         return self.gates.count
 
-    def place(self, memory: Array) -> tuple[int, int]:
+    def place(self, memory: Any) -> tuple[int, int]:
         """See `Racing.place`."""
-        return int(memory[0]) % self.count + 1, int(memory[0]) // self.count + 1
+        passed = int(passed_by(memory)[0])
+        return passed % self.count + 1, passed // self.count + 1
 
-    def goal(self, memory: Array, time: Array) -> Array:
+    def goal(self, memory: Any, time: Array) -> Array:
         """The next gate's centre."""
-        return namespace(memory).asarray(self.gates.position)[memory % self.count]
+        return rows(self.centres(memory, time), passed_by(memory) % self.count)
 
-    def targets(self, memory: Array, time: Array) -> Array:
+    def targets(self, memory: Any, time: Array) -> Array:
         """(n, 2, 3) the centres of the next two gates, world, m."""
-        xp, index = namespace(memory), memory % self.count
-        return xp.asarray(self.gates.position)[xp.stack([index, index + 1], axis=-1)]
+        index = passed_by(memory) % self.count
+        return rows(self.centres(memory, time), namespace(index).stack([index, index + 1], axis=-1))
 
-    def target_offsets(self, memory: Array, time: Array, body: Any) -> Array:
+    def centres(self, memory: Any, time: Array | None = None) -> Array:
+        """(g + 1, 3), or for gates that swing (n, g + 1, 3): see `Gates.position`. Without a time, see `gates_at`."""
+        return namespace(passed_by(memory)).asarray(gates_at(self.gates, memory, self.closed, time).position)
+
+    def target_offsets(self, memory: Any, time: Array, body: Any) -> Array:
         """The same centres minus position."""
         return offsets(self.targets(memory, time), body)
 
@@ -77,15 +83,22 @@ class RaceGoal(Racing):
         (Field("gates", 6, "world", "m", 4.0, "centres of the next two gates minus vehicle position"), target_offsets),
     )
 
-    def advance(self, memory: Array, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Array, Outcome]:
+    def advance(self, memory: Any, before: Any, after: Any, time: Array, timed_out: Array) -> tuple[Any, Outcome]:
         """Judge a step. Success: the last gate of the last lap is passed.
 
         Crossings are judged on the straight line of the step.
         """
         laps = self.config.laps if self.closed else 1
-        end = (laps > 0) & (memory + 1 >= laps * self.count)
-        passed, outcome = self.verdict(memory, before, after, self.gates, memory % self.count, end, self.config.fence)
-        return memory + passed, outcome
+        done = passed_by(memory)
+        end = (laps > 0) & (done + 1 >= laps * self.count)
+        gates = gates_at(self.gates, memory, self.closed, time)
+        passed, outcome = self.verdict(memory, before, after, time, gates, done % self.count, end, self.config.fence)
+        return after_step(memory, passed, time), outcome
+
+    def drawn(self, memory: Any) -> dict[str, Array]:
+        """How the gates swing, if they do: see `SwingingMemory`."""
+        swings = ("cosine", "sine", "rate") if isinstance(memory, SwingingMemory) else ()
+        return {name: getattr(memory, name) for name in swings}
 
     def told(self, arrivals: Sequence[float], mean_error: float, final_error: float, speed: float) -> str:
         """The number of laps and the mean lap time, as text."""

@@ -20,15 +20,15 @@ class Racing(Goal):
         raise NotImplementedError
 
     def verdict(
-        self, memory: Any, before: Any, after: Any, gates: Gates, index: Array, end: Array, fence: Array
+        self, memory: Any, before: Any, after: Any, time: Array, gates: Gates, index: Array, end: Array, fence: Array
     ) -> tuple[Array, Outcome]:
-        """The outcome of a step, and which vehicles have passed a gate in it.
+        """The outcome of a step that ended at `time`, s, and which vehicles have passed a gate in it.
 
         `index` is the next gate, counted from 0 within a lap. `end` marks the vehicles that have finished if they pass
         it. `fence` is the largest allowed distance from it, m.
         """
         passed, missed, struck = gates.judge(index, before.position, after.position, self.shape.radius)
-        error = distance(after.position, self.goal(memory, index))
+        error = distance(after.position, self.goal(memory, time))
         crashed = missed | struck | (error > fence) | touches_ground(self.shape, after)
         passed = passed & ~crashed
         finished = passed & end

@@ -60,6 +60,8 @@ class RaceDuelConfig(RaceConfig):
         super().check(control_rate, feet_height)
         if self.any_track:
             raise ValueError(f"task.track is {self.track!r}; accepted: one track, which all racers of a world share")
+        if self.swing:
+            raise ValueError(f"task.swing is {self.swing:g}; accepted: 0, as the gates of a duel stand still")
         if 2 * self.position >= self.spacing:
             raise ValueError(
                 f"task.position is {self.position}; accepted: less than half of task.spacing, {self.spacing:g} m, so "

@@ -175,9 +175,10 @@ class MujocoPlant(Plant):
             reached = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
             data.ctrl[rotors] = np.minimum(reached, self._ceiling)
             model.actuator_dynprm[rotors, 0] = self._lags()
-            model.actuator_gainprm[rotors, 0] = share * (2 * k2 * speed + k1)
-            model.actuator_biasprm[rotors, 0] = share * (k0 - k2 * speed * speed)
             wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
+            kept = share * self._kept(wind, speed)
+            model.actuator_gainprm[rotors, 0] = kept * (2 * k2 * speed + k1)
+            model.actuator_biasprm[rotors, 0] = kept * (k0 - k2 * speed * speed)
             air = np.array([wind.x, wind.y, wind.z])
             drag = linear + quadratic * np.abs(data.actuator_velocity[drags] - air)
             model.actuator_biasprm[drags, 0] = drag * air
@@ -186,6 +187,16 @@ class MujocoPlant(Plant):
                 data.qfrc_applied[3:] = self._rotor_torque(dt / count)
             self._last_rate = rate
             self._mujoco.mj_step(model, data)
+
+    def _kept(self, wind: Vec3, speed: np.ndarray) -> float | np.ndarray:
+        """Share of its thrust that each rotor keeps in the air that it meets; the wind is in body axes, m/s."""
+        body, motion = self._body, self.data.qvel.tolist()
+        if body.inflow_loss is None:
+            return 1.0
+        air = (Quat(*self.data.qpos[3:].tolist()).unrotate(Vec3(*motion[:3])) - wind).stack()
+        places = rotor_places(body) * [1.0, 1.0, 0.0]
+        inflow = np.sum((air + np.cross(motion[3:], places)) * rotor_axes(body), axis=1)
+        return np.maximum(1.0 - body.inflow_loss * inflow / np.maximum(speed, 1.0), 0.0)
 
     def _powered(self, speed: np.ndarray) -> float:
         """Speed to which the battery brings a rotor, divided by its commanded speed."""

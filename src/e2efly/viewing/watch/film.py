@@ -53,6 +53,8 @@ SHADOW = 0.8
 """Brightness of the ground in the shadow."""
 BACK, RAISED = 4.5, 1.6
 """Position of the camera behind and above the vehicle, divided by the vehicle's radius."""
+FILLED = 0.9
+"""The part of the picture, from its middle, within which the vehicles of a world are."""
 TURN_S = 0.4
 """Time constant with which the camera turns, s."""
 SLOW = 0.5
@@ -93,10 +95,7 @@ def picture(soup: Soup, eye: np.ndarray, look_at: np.ndarray, ground: bool, size
     rays, so that edges are smooth.
     """
     rows, columns = size
-    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
-    right = np.cross(ahead, [0, 0, 1.0])
-    right /= max(float(np.linalg.norm(right)), 1e-9)
-    axes, pixel = np.stack([ahead, right, np.cross(ahead, right)]).astype(np.float32), 2 * SPREAD / rows
+    axes, pixel = _axes((look_at - eye) / np.linalg.norm(look_at - eye)).astype(np.float32), 2 * SPREAD / rows
 
     def rays(y: np.ndarray, x: np.ndarray) -> Float[np.ndarray, "n 3"]:
         """Unit vectors through places in the picture, in pixels from its upper left corner."""
@@ -188,19 +187,40 @@ def _lines(
 
 
 def behind(
-    position: np.ndarray, heading: Float[np.ndarray, "2"], radius: float, ground: bool
+    position: Float[np.ndarray, "k 3"],
+    heading: Float[np.ndarray, "2"],
+    radius: float,
+    ground: bool,
+    size: tuple[int, int] = SIZE,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the camera behind a vehicle is, and the point that it looks at, (3,) m.
 
     Args:
-        position: position of the vehicle, m.
+        position: position of the vehicle, m, and after it those of the others of its world. The camera is so far away
+            that it sees all of them.
         heading: the direction in which the camera looks, level, of any length.
-        radius: radius of the vehicle, m.
+        radius: radius of a vehicle, m.
         ground: whether there is ground at height 0, above which the camera stays.
+        size: rows and columns of the picture.
     """
+    here = position[0]
     back = heading / max(float(np.linalg.norm(heading)), 1e-9)
-    eye = position + radius * np.array([*(-BACK * back), RAISED])
-    return np.array([*eye[:2], max(eye[2], 0.5 * radius)]) if ground else eye, position
+    eye = here + radius * np.array([*(-BACK * back), RAISED])
+    if ground:
+        eye[2] = max(eye[2], 0.5 * radius)
+    away = eye - here
+    far = float(np.linalg.norm(away))
+    to_others = (position[1:] - here) @ _axes(-away / far).T
+    reach = np.array([SPREAD * size[1] / size[0], SPREAD]) * FILLED
+    wanted = ((np.abs(to_others[:, 1:]) + radius) / reach).max(axis=1) - to_others[:, 0]
+    return here + away * max(wanted.max(initial=0.0) / far, 1.0), here
+
+
+def _axes(ahead: np.ndarray) -> Float[np.ndarray, "3 3"]:
+    """The axes of a camera that looks in a direction, a unit vector: ahead, right and down, as rows."""
+    right = np.cross(ahead, [0, 0, 1.0])
+    right /= max(float(np.linalg.norm(right)), 1e-9)
+    return np.stack([ahead, right, np.cross(ahead, right)])
 
 
 def _heading(frame: StageFrame) -> Float[np.ndarray, "2"]:
@@ -211,11 +231,12 @@ def _heading(frame: StageFrame) -> Float[np.ndarray, "2"]:
 
 
 def snapshot(stage: Stage, frame: StageFrame, size: tuple[int, int] = SIZE) -> UInt8[np.ndarray, "h w 3"]:
-    """The picture of one moment, from behind the first vehicle."""
+    """The picture of one moment, from behind the first vehicle, with all others of its world."""
     shape, radius = quadrotor(stage.vehicle), _radius(stage)
     angle = np.zeros((len(frame.position), len(shape.rotors)))
     soup = _standing(stage) + _moving(stage, frame.time, np.zeros(3)) + _flying(shape, frame, angle, radius)
-    return picture(soup, *behind(frame.position[0], _heading(frame), radius, stage.ground), stage.ground, size)
+    place = behind(frame.position[: frame.together], _heading(frame), radius, stage.ground, size)
+    return picture(soup, *place, stage.ground, size)
 
 
 def _radius(stage: Stage) -> float:
@@ -251,11 +272,11 @@ def film(
     """Pictures of a source, (h, w, 3) uint8, with the images of the first vehicle's cameras beside them.
 
     Args:
-        source: the source of the frames. The first vehicle is followed.
+        source: the source of the frames. The first vehicle is followed. The vehicles of its world have trails.
         seconds: duration of the flight, s.
         rate: pictures per second of the flight.
-        camera: a name of `viewer.CAMERAS`. A camera that stays in place looks at the first vehicle from where that
-            began.
+        camera: a name of `viewer.CAMERAS`. One that follows stays so far behind that it sees all vehicles of the
+            world. One that stays in place looks at the first vehicle from where that began.
         size: rows and columns, without the camera images.
     """
     first = source.stage_of(0)
@@ -271,11 +292,12 @@ def film(
             still, shape = _standing(stage), quadrotor(stage.vehicle)
         if frame.fresh:
             past.clear()
-        here, radius = frame.position[0], _radius(stage)
+        world, radius = frame.position[: frame.together], _radius(stage)
+        here = world[0]
         heading = heading + follows * (_heading(frame) - heading) if past else _heading(frame)
-        from_behind = behind(here, heading, radius, stage.ground)
+        from_behind = behind(world, heading, radius, stage.ground, size)
         eye = from_behind[0] if not past else eye
-        past.append(here.copy())
+        past.append(world.copy())
         angle = (angle + shape.spin * frame.rotor_speed / SLOWEST * source.period) % (2 * np.pi)
         if flown < due - 1e-9:
             continue
@@ -285,7 +307,7 @@ def film(
             moved
             + _moving(stage, frame.time, source.origin)
             + _flying(shape, frame, angle, radius)
-            + _trail(past, 0.03 * radius)
+            + _trails(past, 0.03 * radius)
         )
         ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
         match camera:
@@ -335,9 +357,9 @@ def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, radius: floa
     return Soup.of(meshes)
 
 
-def _trail(past: Iterable[np.ndarray], thick: float) -> Soup:
-    points = np.array(list(past))
-    return Soup.of(_tube(points, TRAIL, thick) if len(points) > 1 else ())
+def _trails(past: Iterable[Float[np.ndarray, "k 3"]], thick: float) -> Soup:
+    ways = np.swapaxes(np.array(list(past)), 0, 1)
+    return Soup.of(mesh for way in ways for mesh in _tube(way, TRAIL, thick))
 
 
 def _tube(points: np.ndarray, colour: tuple[float, float, float], thick: float) -> list[Mesh]:

@@ -48,9 +48,6 @@ class Panel:
         speed.on_update(lambda _: self.wishes.put(lambda: setattr(self, "speed", float(speed.value))))
         camera = gui.add_dropdown("Camera", CAMERAS, initial_value=CAMERAS[0])
         camera.on_update(lambda _: self.wishes.put(lambda: self._look(camera.value)))
-        if viewer.count > 1:
-            followed = gui.add_slider("Vehicle", min=0, max=viewer.count - 1, step=1, initial_value=0)
-            followed.on_update(lambda _: self.wishes.put(lambda: viewer.follow(int(followed.value))))
         self._frames = 0
         self._time = 0.0
         self._images: dict[str, Any] = {}
@@ -65,6 +62,12 @@ class Panel:
         """
         shown = self._gui.add_markdown("")
         return lambda text: setattr(shown, "content", as_markdown(text))
+
+    def choose_among(self, count: int) -> None:
+        """Add a slider that chooses which of `count` vehicles is followed, unless there is only one."""
+        if count > 1:
+            followed = self._gui.add_slider("Vehicle", min=0, max=count - 1, step=1, initial_value=0)
+            followed.on_update(lambda _: self.wishes.put(lambda: self.viewer.follow(int(followed.value))))
 
     def button(self, label: str, wish: Callable[[], Any]) -> None:
         """Add a button."""

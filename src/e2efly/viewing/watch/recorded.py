@@ -131,6 +131,8 @@ class Recording:
     """The vehicle that is drawn."""
     stage: Stage | None = None
     """The stage. None: level ground."""
+    together: int = 1
+    """Number of flights of the same world: the first ones."""
     at: int = 0
     """Number of the next frame."""
     period: float = field(default=PERIOD, init=False)
@@ -171,5 +173,5 @@ class Recording:
         note += f"tilted {tilt:.0f} degrees\n{told.name} {mode}"
         return StageFrame(
             i * PERIOD, now("position"), now("quaternion"), now("velocity"), now("rotor_speed"), now("goal"),
-            series=series, fresh=i == 0, note=note,
+            series=series, fresh=i == 0, together=self.together, note=note,
         )  # fmt: skip

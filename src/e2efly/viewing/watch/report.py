@@ -46,7 +46,10 @@ class ShownReport:
     """Label for people: criterion, number, and how the flight ended."""
     criterion: str
     flights: tuple[RecordedFlight, ...]
-    """The flight on the plant, then the flight in the training simulator."""
+    """The flight on the plant, then the flight in the training simulator. Of several vehicles in a world, those of all
+    on the plant, then those of all in the simulator."""
+    together: int
+    """Number of vehicles in a world."""
     stage: Stage
     """The world of that start."""
 
@@ -95,15 +98,21 @@ def read_report(path: Path) -> tuple[list[ShownReport], Vehicle]:
         starts = draw_starts(env, env.whole(int(pair.starts.max(initial=0)) + 1), told.seed)
         _check(path, content["criteria"], criterion, pair, starts)
         scene = env.task.scene(starts.memory)
-        for row, number in enumerate(pair.starts.tolist()):
-            begin = starts.states[number]
-            ended = {place: flights.ending(row) for place, flights in pair.flown.items()}
-            name = f"{criterion} {number}: {ended['plant']}"
+        numbers = pair.starts.tolist()
+        for first in range(0, len(numbers), env.agents):
+            world = list(enumerate(numbers))[first : first + env.agents]
             flights = tuple(
-                flight_of(f"{criterion} {number} {where}: {ended[place]}", begin, pair.flown[place], row)
+                flight_of(
+                    f"{criterion} {number} {where}: {pair.flown[place].ending(row)}",
+                    starts.states[number], pair.flown[place], row,
+                )
                 for place, where in (("plant", f"on {told.plant}"), ("training", "in the training simulator"))
-            )
-            shown.append(ShownReport(name, criterion, flights, stage(flew.flown.body, suite, scene, number)))
+                for row, number in world
+            )  # fmt: skip
+            number = numbers[first]
+            name = f"{criterion} {number}: {pair.flown['plant'].ending(first)}"
+            seen = stage(flew.flown.body, suite, scene, number)
+            shown.append(ShownReport(name, criterion, flights, env.agents, seen))
     return shown, flew.flown.body
 
 

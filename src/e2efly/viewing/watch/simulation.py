@@ -53,7 +53,7 @@ def moment(env: Env, task: TaskConfig, state: EnvState, row: int) -> tuple[Stage
     each = [row, *(i for i in range(first, first + env.agents) if i != row)]
     there = (s.position, s.quaternion, s.velocity, s.rotor_speed, goal)
     position, quaternion, velocity, rotor_speed, aim = (np.asarray(x, float)[each] for x in there)
-    frame = StageFrame(float(state.time[row]), position, quaternion, velocity, rotor_speed, aim)
+    frame = StageFrame(float(state.time[row]), position, quaternion, velocity, rotor_speed, aim, together=env.agents)
     return stage(env.physics.flown, task, env.task.scene(state.memory), row), frame
 
 
@@ -229,6 +229,7 @@ class Simulation:
             images=self._images(followed),
             series=self._series(followed, seen),
             fresh=fresh,
+            together=self.env.agents,
             note=self._note(followed, seen),
         )
 

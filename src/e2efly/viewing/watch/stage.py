@@ -50,6 +50,8 @@ class StageFrame:
     """Numbers of the followed vehicle by title: the commanded value, then the actual value, or only one value."""
     fresh: bool = False
     """Whether the followed vehicle starts anew in this frame. Its old trail then ends."""
+    together: int = 1
+    """Number of vehicles in the first vehicle's world: the first ones. Films show all of them."""
     note: str = ""
     """Note about the moment, Markdown."""
 

@@ -48,7 +48,7 @@ LEVEL = np.array([1, 0, 0, 0], np.float32)
 ANCHOR = np.array([0.0, 0.0, 1.0])
 """Position of the followed vehicle in the space of the page."""
 GHOST = (120, 140, 165)
-"""RGB of all vehicles except the followed one, when there are several plants."""
+"""RGB of the vehicles of a second flight, which is shown with the first."""
 
 
 def serve(host: str, port: int, title: str) -> Any:
@@ -107,15 +107,14 @@ def _checked(host: str) -> Iterator[None]:
 class Viewer:
     """Shows frames to everyone who has the page open. Nothing here waits for a browser."""
 
-    def __init__(self, server: Any, count: int, ghosts: bool = False) -> None:
-        """Show `count` vehicles.
+    def __init__(self, server: Any, coloured: int | None = None) -> None:
+        """Show as many vehicles as the first frame has.
 
         Args:
             server: the server from `serve`.
-            count: number of vehicles in each frame.
-            ghosts: whether all vehicles except the followed one are pale.
+            coloured: number of vehicles that are not pale: the first ones. None: all.
         """
-        self.server, self.count, self.ghosts = server, count, ghosts
+        self.server, self.count, self.coloured = server, 0, coloured
         self.followed, self.camera = 0, CAMERAS[0]
         self._scene = server.scene
         self._world = self._scene.add_frame("/world", show_axes=False)
@@ -126,7 +125,7 @@ class Viewer:
         self._bodies: list[Any] = []
         self._rotors: Any = None
         self._goals: Any = None
-        self._angle = np.zeros((count, 1))
+        self._angle = np.zeros((1, 1))
         self._trail: deque[tuple[np.ndarray, float]] = deque(maxlen=TRAIL_POINTS + 1)
         self._line: Any = None
         self._load: Any = None
@@ -142,6 +141,7 @@ class Viewer:
             frame: the frame.
             elapsed: flight time since the last frame, s.
         """
+        self.count = len(frame.position)
         with self.server.atomic():
             if stage is not self._stage:
                 self._set(stage)
@@ -196,8 +196,8 @@ class Viewer:
         """Add a mesh with `each` instances for each vehicle."""
         count = each * self.count
         colours = np.tile(_rgb(mesh.colour), (count + len(FAR_OFF), 1))
-        if self.ghosts:
-            colours[each:] = GHOST
+        if self.coloured is not None:
+            colours[each * self.coloured :] = GHOST
         place, level = np.zeros((count, 3), np.float32), np.tile(LEVEL, (count, 1))
         return self._scene.add_batched_meshes_simple(
             name, mesh.vertices, mesh.faces, *_and_far_off(level, place), batched_colors=colours, lod="off",
