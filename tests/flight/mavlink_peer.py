@@ -5,9 +5,6 @@ bridge. They prove format, order, signs and time-outs as they are documented, no
 """
 
 import struct
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,21 +13,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.settings import FlightSettings
-from e2efly.policy.odometry import Sample
-from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.vehicle import Vehicle
+from tests.flight.peer_rig import STEP_S, FlownPeer
 
-STEP_S = 0.002
-"""Of rate loop and world, s."""
 RATES_HZ = {"ATTITUDE_QUATERNION": 4.0, "HIGHRES_IMU": 4.0, "RAW_IMU": 4.0, "RC_CHANNELS": 4.0, "SYS_STATUS": 1.0}
 """Streams before anybody asks for more."""
 OFFBOARD, PX4_LAND, PX4_POSITION, PX4_STABILIZED = 6 << 16, (4 << 16) | (6 << 24), 3 << 16, 7 << 16
 GUIDED_NOGPS, COPTER_LAND, COPTER_STABILIZE = 20, 9, 0
 FLU = np.array([1.0, -1.0, -1.0])
-RATE_GAIN = np.array([22.0, 22.0, 11.0])
-"""Angular acceleration over the error of the body rate, 1/s."""
-POSE_S, POSE_NOISE = 1 / 200, (0.0005, 0.01, 0.02, 0.001)
-VIBRATION = 0.3
 RADIO_S = 0.02
 PX4_VALUES = {
     "COM_OF_LOSS_T": 0.3, "COM_OBL_RC_ACT": 4, "NAV_RCL_ACT": 3, "COM_RCL_EXCEPT": 0, "COM_RC_IN_MODE": 0,
@@ -48,71 +38,7 @@ COPTER_VALUES = {
 }  # fmt: skip
 
 
-@dataclass
-class Wire:
-    """Bytes both ways, late by `delay` s, and what may happen to them. It is the bridge's `Link`."""
-
-    now: Callable[[], float]
-    delay: float = 0.002
-    alive: bool = True
-    up: bool = True
-    """Whether what the bridge sends arrives."""
-    down: bool = True
-    """Whether what the autopilot sends arrives."""
-    connections: int = 1
-    reason: str = ""
-    _up: deque[tuple[float, bytes]] = field(default_factory=deque)
-    _down: deque[tuple[float, bytes]] = field(default_factory=deque)
-
-    def poll(self, now: float) -> None:
-        del now
-
-    def send(self, data: bytes) -> None:
-        if self.alive and self.up:
-            self._up.append((self.now() + self.delay, data))
-
-    def receive(self) -> bytes:
-        return self._ready(self._down) if self.alive else b""
-
-    def answer(self, data: bytes) -> None:
-        if self.down:
-            self._down.append((self.now() + self.delay, data))
-
-    def arrived(self) -> bytes:
-        return self._ready(self._up)
-
-    def close(self) -> None:
-        self.alive, self.reason = False, "closed"
-
-    def _ready(self, queue: deque[tuple[float, bytes]]) -> bytes:
-        data = b""
-        while queue and queue[0][0] <= self.now():
-            data += queue.popleft()[1]
-        return data
-
-
-@dataclass(frozen=True)
-class Hand:
-    """The pilot's transmitter."""
-
-    armed: bool = False
-    override: bool = False
-    mission: str = "land"
-    roll: float = 0.0
-    pitch: float = 0.0
-    throttle: float = 0.0
-    yaw: float = 0.0
-
-    def channels(self, forward: int) -> list[int]:
-        mission = {"land": -1.0, "hover": 0.0, "policy": 1.0}[self.mission]
-        sticks, switches = (
-            (self.roll, forward * self.pitch, self.throttle, self.yaw),
-            (self.armed, self.override, False),
-        )
-        return [round(1500 + 500 * at) for at in (*sticks, *(2 * on - 1 for on in switches), mission)]
-
-
-class MavlinkRig:
+class MavlinkRig(FlownPeer):
     """An autopilot in its world, with a pilot and poses: what `Session` flies."""
 
     def __init__(
@@ -124,80 +50,31 @@ class MavlinkRig:
         seed: int = 0,
         values: dict[str, float] | None = None,
     ) -> None:
-        self.px4, self.latency = kind == "px4", latency
-        self.world = World(vehicle)
-        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)
-        self.state: FlownBody = self.world.at_rest()
+        super().__init__(vehicle, latency, seed)
+        self.px4 = kind == "px4"
         self.values = dict(PX4_VALUES if self.px4 else COPTER_VALUES) | (values or {})
-        self.time, self.wind, self.hand, self.heard = 1.0, np.zeros(3), Hand(), True
-        self.volts = 15.6
-        self.wire = Wire(self.now)
         self.mav = mav.MAVLink(None, srcSystem=1, srcComponent=1)
         self.reader = mav.MAVLink(None)
         self.mode = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
         self.armed = self.critical = self.received = self._arm = False
-        self.log: list[str] = []
-        """What it did, in order: modes, arming, failsafes."""
         self.poses_seen = 0
         self._streams = dict(RATES_HZ)
         self._due = dict.fromkeys((*RATES_HZ, "HEARTBEAT"), 0.0)
         self._streams["HEARTBEAT"] = 1.0
         self._setpoint: tuple[float, np.ndarray] | None = None
         self._since = self._at = self._beat = -np.inf
-        self._noise = np.random.default_rng(seed)
-        self._poses: deque[Sample] = deque()
-        self._pose_due = 0.0
-        self._force, self._motors = np.array([0.0, 0.0, 9.81]), np.zeros(4)
         self._radio = self.time
         self._landing = 0.0
-        self._left = 0.0
-
-    # -- what a bench offers -------------------------------------------------------------------------------------------
-
-    def now(self) -> float:
-        return self.time
-
-    def set(self, **changes: Any) -> None:
-        self.hand = replace(self.hand, **changes)
-
-    def sleep(self, seconds: float) -> None:
-        self._left += seconds
-        while self._left > STEP_S / 2:
-            self._left -= STEP_S
-            self._step()
-
-    def poses(self, now: float) -> list[Sample]:
-        ready = []
-        while self._poses and self._poses[0].received + self.latency <= now:
-            ready.append(replace(self._poses.popleft(), received=now))
-        return ready
 
     def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Mavlink:
         del hover
         return Mavlink.connect(self.wire, settings, 5.0, self)
 
-    # -- world ---------------------------------------------------------------------------------------------------------
-
-    def _step(self) -> None:
-        self.time += STEP_S
+    def hear(self) -> None:
         for message in self.reader.parse_buffer(self.wire.arrived()) or []:
             if message.get_type() != "BAD_DATA":
                 self._take(message)
         self._decide()
-        self._motors = self._loop()
-        before, self.state = self.state, self.world.advance(self.state, self._motors, STEP_S, self.wind)
-        shaken = VIBRATION * self._noise.normal(size=3) * bool(self._motors.any())
-        self._force = np.asarray(self.world.sensed(before, self.state, STEP_S).specific_force) + shaken
-        if self.time >= self._pose_due:
-            self._pose_due = self.time + POSE_S
-            s, n = self.state, self._noise
-            position, velocity, rate = (
-                np.asarray(x) + sigma * n.normal(size=3)
-                for x, sigma in zip((s.position, s.velocity, s.body_rate), POSE_NOISE[:3], strict=True)
-            )
-            q = np.asarray(s.quaternion) + POSE_NOISE[3] / 2 * n.normal(size=4)
-            self._poses.append(Sample(self.time, position, q / np.linalg.norm(q), self.time, velocity, rate))
-        self._stream()
 
     # -- autopilot -----------------------------------------------------------------------------------------------------
 
@@ -236,7 +113,7 @@ class MavlinkRig:
         mine = OFFBOARD if self.px4 else GUIDED_NOGPS
         land = PX4_LAND if self.px4 else COPTER_LAND
         manual = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
-        if received and self.hand.armed is not self._arm and (self.hand.armed or self._standing):  # moved, not held
+        if received and self.hand.armed is not self._arm and (self.hand.armed or self.standing):  # moved, not held
             self._arm = self.hand.armed
             if self.armed is not self._arm:
                 self.armed = self._arm
@@ -257,7 +134,7 @@ class MavlinkRig:
                 self._fail("set-points", action)
             elif not self.px4 and self.values["FS_GCS_ENABLE"] == 5 and self.armed and self._deserted:
                 self._fail("ground station", land)
-        if self.mode == land and self._standing and self.time - self._landing > 1.0 and self.armed:
+        if self.mode == land and self.standing and self.time - self._landing > 1.0 and self.armed:
             self.armed = False
             self.log.append("disarmed")
 
@@ -275,11 +152,7 @@ class MavlinkRig:
         """Whether heartbeats came once, and do not any more."""
         return bool(np.isfinite(self._beat)) and self.time - self._beat > self.values["FS_GCS_TIMEOUT"]
 
-    @property
-    def _standing(self) -> bool:
-        return float(self.state.position[2]) <= self.world.vehicle.feet_height + 0.005
-
-    def _loop(self) -> np.ndarray:
+    def outputs(self) -> np.ndarray:
         """Motor outputs of the active mode."""
         vehicle = self.world.vehicle
         if not self.armed:
@@ -288,49 +161,16 @@ class MavlinkRig:
         if self.mode == mine and self._setpoint is not None:
             thrust, rates = self._setpoint
             if not self.px4 and self.time - self._at > self.values["GUID_TIMEOUT"]:
-                return self._mixed(*self._level(0.0))
+                return self.mixed(*self.level(0.0))
             bend = self.values["THR_MDL_FAC" if self.px4 else "MOT_THST_EXPO"]
             root = thrust if bend == 0 else ((bend - 1) + np.sqrt((1 - bend) ** 2 + 4 * bend * thrust)) / (2 * bend)
             speed = vehicle.rotor_speed_min + root * (self.world.full_speed - vehicle.rotor_speed_min)
-            return self._mixed(4 * self._thrust(speed), rates)
+            return self.mixed(4 * self.thrust(speed), rates)
         if self.mode in (PX4_LAND, COPTER_LAND):
-            return self._mixed(*self._level(-0.6))
+            return self.mixed(*self.level(-0.6))
         stick = self.hand.throttle if self.heard else 0.0
         climb = 0.0 if abs(stick) < 0.1 else stick
-        return self._mixed(*self._level(climb)) if not self._standing or climb > 0 else np.zeros(4)
-
-    def _level(self, climb: float) -> tuple[float, np.ndarray]:
-        """Thrust, N, and body rates that level the vehicle and reach a vertical speed."""
-        w, x, y, z = np.asarray(self.state.quaternion)
-        up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-        rates = np.array([-5.0 * up[1], 5.0 * up[0], 0.0])
-        wanted = 9.81 + 3.0 * (climb - float(self.state.velocity[2]))
-        return float(self.world.vehicle.mass) * max(wanted, 0.0) / max(up[2], 0.5), rates
-
-    def _thrust(self, speed: float) -> float:
-        k2, k1, k0 = (float(k) for k in self.world.vehicle.thrust_map)
-        return max((k2 * speed + k1) * speed + k0, 0.0)
-
-    def _mixed(self, thrust: float, rates: np.ndarray) -> np.ndarray:
-        """Motor outputs for a thrust, N, and body rates: a proportional rate loop, and torque before thrust."""
-        vehicle = self.world.vehicle
-        torque = (
-            np.asarray(vehicle.inertia, float)
-            * 22.0
-            * (rates - np.asarray(self.state.body_rate))
-            * np.array([1.0, 1.0, 0.5])
-        )
-        places = np.asarray(vehicle.rotor_position, float)
-        spin = np.asarray(vehicle.rotor_spin, float)
-        effect = np.stack([np.ones(4), places[:, 1], -places[:, 0], spin * float(vehicle.torque_ratio)])
-        share = np.linalg.solve(effect, np.array([0.0, *torque]))
-        low, top = self._thrust(float(vehicle.rotor_speed_min)), self._thrust(self.world.full_speed)
-        spread = share.max() - share.min()
-        share *= min(1.0, (top - low) / max(spread, 1e-9))
-        base = np.clip(thrust / 4, low - share.min(), top - share.max())
-        k2, k1, k0 = (float(k) for k in vehicle.thrust_map)
-        speeds = (-k1 + np.sqrt(np.maximum(k1**2 + 4 * k2 * (base + share - k0), 0.0))) / (2 * k2)
-        return np.clip(speeds / self.world.full_speed, 0.0, 1.0)
+        return self.mixed(*self.level(climb)) if not self.standing or climb > 0 else np.zeros(4)
 
     # -- telemetry -----------------------------------------------------------------------------------------------------
 
@@ -338,7 +178,7 @@ class MavlinkRig:
         self.wire.answer(message.pack(self.mav))
         self.mav.seq = (self.mav.seq + 1) % 256
 
-    def _stream(self) -> None:
+    def tell(self) -> None:
         for name, rate in self._streams.items():
             if self.time >= self._due[name]:
                 self._due[name] = self.time + 1 / rate - STEP_S / 2
@@ -348,7 +188,7 @@ class MavlinkRig:
 
     def _message(self, name: str) -> Any:
         ms, s = round(self.time * 1e3), self.state
-        force, gyro = self._force * FLU, np.asarray(s.body_rate) * FLU
+        force, gyro = self.force * FLU, np.asarray(s.body_rate) * FLU
         if name == "HEARTBEAT":
             base = (mav.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0) | mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             state = mav.MAV_STATE_CRITICAL if self.critical else mav.MAV_STATE_ACTIVE

@@ -214,7 +214,7 @@ def bench() -> MavlinkRig:
 def test_an_autopilot_of_ones_own_is_a_reference_to_a_file(tmp_path: Path) -> None:
     file, hover = tmp_path / "own.py", ("geometric", hover_controller("geometric", VEHICLE, 0.03))
     file.write_text(OWN)
-    own, watchdog = open_autopilot(f"{file}:Own:text", SETTINGS, hover, watched=True, excited=False)
+    own, watchdog = open_autopilot(f"{file}:Own:text", VEHICLE, SETTINGS, hover, watched=True, excited=False)
     assert watchdog is None and own.versions["firmware"] == "PX4 1.15.4"
     with pytest.raises(ValueError, match=r"Half has no versions, .* accepted: all of versions"):
-        open_autopilot(f"{file}:Half", SETTINGS, hover, watched=True, excited=False)
+        open_autopilot(f"{file}:Half", VEHICLE, SETTINGS, hover, watched=True, excited=False)

@@ -269,7 +269,7 @@ def run(options: Fly) -> int:
         if commands is not None:
             stack.callback(commands.close)
         autopilot, watchdog = open_autopilot(
-            options.link, settings, (options.hover, hover), watched=options.watchdog and not options.check,
+            options.link, body, settings, (options.hover, hover), watched=options.watchdog and not options.check,
             excited=bool(excited),
         )  # fmt: skip
         stack.callback(autopilot.close)

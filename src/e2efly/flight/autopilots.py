@@ -8,11 +8,15 @@ from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, 
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.descent_plan import DescentWatchdog
 from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.crazyflie.crazyflie import Crazyflie
+from e2efly.flight.crazyflie.crtp_link import CRAZYFLIE, RADIO, open_crtp
+from e2efly.flight.crazyflie.words import Words
 from e2efly.flight.flight_loop import Watchdog
 from e2efly.flight.link import Link, open_link
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import ROTOR_SPEED, HoverController
 from e2efly.flight.settings import FlightSettings
+from e2efly.vehicles.vehicle import Vehicle
 
 MAVLINK = "mavlink:"
 """Begins the text of a link to an autopilot that speaks MAVLink."""
@@ -21,13 +25,21 @@ CONNECT_S = 5.0
 
 
 def open_autopilot(
-    target: str, settings: FlightSettings, hover: tuple[str, HoverController], *, watched: bool, excited: bool
+    target: str,
+    vehicle: Vehicle,
+    settings: FlightSettings,
+    hover: tuple[str, HoverController],
+    *,
+    watched: bool,
+    excited: bool,
 ) -> tuple[Autopilot, Watchdog | None]:
     """Connect to an autopilot, and identify it. `close` of the autopilot closes the link.
 
     Args:
-        target: the text of the link; `mavlink:` and a link; or a reference to a class of one's own,
-            path/to/file.py:Name[:...], which is made with the text after it and `settings`, and is an `Autopilot`.
+        target: the text of the link; `mavlink:` and a link; `radio://` or `crazyflie:` for a Crazyflie; or a reference
+            to a class of one's own, path/to/file.py:Name[:...], which is made with the text after it and `settings`,
+            and is an `Autopilot`.
+        vehicle: the vehicle that flies.
         settings: the limits of the flight, with the pilot's channels.
         hover: name of the hover controller, and the controller, which may need more telemetry.
         watched: a watchdog holds the link, where the autopilot does not land by itself when commands end.
@@ -43,6 +55,8 @@ def open_autopilot(
     """
     if target.startswith(MAVLINK):
         return _mavlink(target, settings, hover), None
+    if target.startswith((CRAZYFLIE, RADIO)):
+        return _crazyflie(target, vehicle, settings, hover), None
     if (own := referenced(target)) is not None:
         made = load(own[0])(own[1], settings)
         check_methods(made, METHODS)
@@ -68,6 +82,8 @@ def check_link(target: str) -> None:
     """
     if (own := referenced(target)) is not None:
         load(own[0])
+    elif target.startswith((CRAZYFLIE, RADIO)):
+        open_crtp(target).close()
     else:
         open_link(target.removeprefix(MAVLINK)).close()
 
@@ -89,6 +105,24 @@ def _mavlink(target: str, settings: FlightSettings, hover: tuple[str, HoverContr
         held.close()
         raise
     return autopilot
+
+
+def _crazyflie(
+    target: str, vehicle: Vehicle, settings: FlightSettings, hover: tuple[str, HoverController]
+) -> Autopilot:
+    """A Crazyflie, whose pilot types into this terminal. Its firmware decides alone what happens when commands end."""
+    if ROTOR_SPEED in hover[1].needs:
+        raise ValueError(
+            f"--hover is {hover[0]!r}, which needs the speeds of the rotors, and a Crazyflie tells none; accepted: "
+            "geometric, mpc or pid"
+        )
+    held = open_crtp(target)
+    try:
+        _connect(held, target)
+        return Crazyflie.connect(held, vehicle, settings, Words(), CONNECT_S)
+    except BaseException:
+        held.close()
+        raise
 
 
 def _connect(link: Link, target: str) -> None:

@@ -1,0 +1,1 @@
+"""Crazyflies over CRTP."""
