@@ -14,7 +14,8 @@ from typing import Any
 
 from common import arguments, table, write
 from tests.flight.mavlink_peer import MavlinkRig
-from tests.validation.mavlink_faults import FAULTS, flown
+from tests.validation.link_faults import flown
+from tests.validation.mavlink_faults import FAULTS
 
 from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.policy.loader import load_policy

@@ -3,6 +3,7 @@
 Nothing here is shared with the bridge.
 """
 
+import random
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -33,8 +34,11 @@ class Wire:
     """Whether what the bridge sends arrives."""
     down: bool = True
     """Whether what the autopilot sends arrives."""
+    loss: float = 0.0
+    """Share of what is sent that does not arrive, either way."""
     connections: int = 1
     reason: str = ""
+    _chance: random.Random = field(default_factory=lambda: random.Random(0))
     _up: deque[tuple[float, bytes]] = field(default_factory=deque)
     _down: deque[tuple[float, bytes]] = field(default_factory=deque)
 
@@ -42,14 +46,14 @@ class Wire:
         del now
 
     def send(self, data: bytes) -> None:
-        if self.alive and self.up:
+        if self.alive and self.up and not self._lost():
             self._up.append((self.now() + self.delay, data))
 
     def receive(self) -> bytes:
         return self._ready(self._down) if self.alive else b""
 
     def answer(self, data: bytes) -> None:
-        if self.down:
+        if self.down and not self._lost():
             self._down.append((self.now() + self.delay, data))
 
     def arrived(self) -> bytes:
@@ -57,6 +61,9 @@ class Wire:
 
     def close(self) -> None:
         self.alive, self.reason = False, "closed"
+
+    def _lost(self) -> bool:
+        return self.loss > 0 and self._chance.random() < self.loss
 
     def _ready(self, queue: deque[tuple[float, bytes]]) -> bytes:
         data = b""

@@ -26,7 +26,8 @@ from e2efly.validation.bridge_session import Session, rehearsal_settings
 from e2efly.validation.rehearsal import LINK_S, whole_course, whole_flight
 from e2efly.vehicles.loading import load_vehicle
 from tests.flight.mavlink_peer import COPTER_VALUES, PX4_VALUES, MavlinkRig
-from tests.validation.mavlink_faults import FAULTS, Fault, flown
+from tests.validation.link_faults import Fault, flown
+from tests.validation.mavlink_faults import FAULTS
 
 VEHICLE = load_vehicle("vis_r")
 KINDS = ("px4", "copter")

@@ -81,7 +81,7 @@ def whole(rest: bytearray) -> Iterator[bytes]:
 def setpoint(rates: tuple[float, float, float], thrust: int) -> CrtpPacket:
     """Body rates, rad/s, and thrust, 0 (motors stopped) to 65535. The firmware's pitch is opposite to FLU's."""
     p, q, r = (math.degrees(rate) for rate in rates)
-    return CrtpPacket(GENERIC_COMMANDER, 0, struct.pack("<BfffHB", MANUAL, p, -q, r, thrust, 1))
+    return CrtpPacket(GENERIC_COMMANDER, 0, struct.pack("<BfffHB", MANUAL, p, 0.0 - q, r, thrust, 1))
 
 
 def external_pose(position: Sequence[float], quaternion: Sequence[float]) -> CrtpPacket:

@@ -49,10 +49,10 @@ def open_crtp(target: str) -> StreamLink:
         if channel <= 125:
             rate = RATES[found[3]]
             return StreamLink(target, lambda: RadioPort(crazyradio(number), channel, rate, address))
-    if found := re.fullmatch(r"udp:(.+):(\d{1,5})", text):
+    if (found := re.fullmatch(r"udp:(.+):(\d{1,5})", text)) and 0 < int(found[2]) < 65536:
         try:
             family, _, _, _, peer = socket.getaddrinfo(found[1].strip("[]"), int(found[2]), type=socket.SOCK_DGRAM)[0]
-        except (OSError, OverflowError) as error:
+        except (OSError, UnicodeError) as error:
             raise ValueError(f"link {target!r}: no such address ({error}); accepted: {ACCEPTED}") from None
         return StreamLink(target, lambda: _DatagramPort(family, peer))
     raise ValueError(f"link {target!r}; accepted: {ACCEPTED}")
