@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from e2efly.flight.crazyflie.crazyflie import Crazyflie
-from e2efly.flight.crazyflie.words import Wish
+from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
+from e2efly.flight.crazyflie.words import TypedWish
 from e2efly.flight.pilot.flight_state import Mission
 from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.settings import FlightSettings
@@ -73,13 +73,17 @@ class CrazyflieRig(FlownPeer):
         if needs_arming:
             self.supervisor = "passed"
 
-    def wish(self) -> Wish | None:
+    def wish(self) -> TypedWish | None:
         """What the pilot has typed."""
-        return Wish(self.hand.armed, Mission(self.hand.mission)) if self.heard else None
+        return TypedWish(self.hand.armed, Mission(self.hand.mission)) if self.heard else None
 
     def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Crazyflie:
         del hover
         return Crazyflie.connect(self.wire, self.world.vehicle, settings, self.wish, 1.0, self)
+
+    def command(self, rates: np.ndarray, thrust: float) -> None:
+        """A set-point: body rates, rad/s, FLU, and thrust, 0 to 1."""
+        self._rates, self._thrust, self._at = rates, thrust, self.time
 
     # -- packets -------------------------------------------------------------------------------------------------------
 
@@ -115,7 +119,7 @@ class CrazyflieRig(FlownPeer):
             case (7, 0) if data[0] == 11:
                 p, q, r, thrust, rate = struct.unpack("<fffHB", data[1:])
                 assert rate == 1
-                self._rates, self._thrust, self._at = np.radians([p, -q, r]), thrust / 65535, self.time
+                self.command(np.radians([p, -q, r]), thrust / 65535)
             case (6, 1) if data[0] == 8:
                 self.pose_seen = struct.unpack("<7f", data[1:])
                 self.poses_seen += 1

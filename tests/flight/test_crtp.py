@@ -11,7 +11,7 @@ from e2efly.flight.autopilots import check_link
 from e2efly.flight.crazyflie.contents import entry
 from e2efly.flight.crazyflie.crtp import LOGS, PARAMETERS, CrtpPacket, PacketReader, arming, external_pose, setpoint
 from e2efly.flight.crazyflie.crtp_link import RadioPort
-from e2efly.flight.crazyflie.words import Wish, Words
+from e2efly.flight.crazyflie.words import TypedWish, Words
 from e2efly.flight.pilot.flight_state import Mission
 
 
@@ -126,11 +126,12 @@ def test_a_radio_tells_when_nobody_answers_and_when_it_is_pulled_out() -> None:
 def test_the_pilot_types_words_and_any_other_line_lands() -> None:
     reads, writes = os.pipe()
     words = Words(reads)
-    assert words() == Wish()
+    assert words() == TypedWish()
     for typed, wish in (
-        (b"arm\n", Wish(True)), (b"hov", Wish(True)), (b"er\n", Wish(True, Mission.HOVER)),
-        (b"Policy\n", Wish(True, Mission.POLICY)), (b"\n", Wish(True)), (b"hover\n", Wish(True, Mission.HOVER)),
-        (b"hoover\n", Wish(True)), (b"hover\noff\n", Wish()), (b"hover\n", Wish(False, Mission.HOVER)),
+        (b"arm\n", TypedWish(True)), (b"hov", TypedWish(True)), (b"er\n", TypedWish(True, Mission.HOVER)),
+        (b"Policy\n", TypedWish(True, Mission.POLICY)), (b"\n", TypedWish(True)),
+        (b"hover\n", TypedWish(True, Mission.HOVER)),
+        (b"hoover\n", TypedWish(True)), (b"hover\noff\n", TypedWish()), (b"hover\n", TypedWish(False, Mission.HOVER)),
     ):  # fmt: skip
         os.write(writes, typed)
         assert words() == wish, typed

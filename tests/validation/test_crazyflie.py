@@ -12,7 +12,7 @@ import pytest
 
 from e2efly.commands.fly import Fly
 from e2efly.commands.fly import run as fly_command
-from e2efly.flight.crazyflie.crazyflie import Crazyflie
+from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
 from e2efly.flight.crazyflie.crazyflie_needs import NEEDS
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pilot.hovering import hover_controller

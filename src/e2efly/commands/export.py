@@ -10,8 +10,11 @@ import tyro
 from e2efly.commands.terminal import Terminal
 from e2efly.config.storage import write_atomically
 from e2efly.policy.c_export.header import Precision
+from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import beside, policy_file
 from e2efly.simulation.device import prepare
+from e2efly.vehicles.loading import load_vehicle
+from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 
 @dataclass(frozen=True)
@@ -30,15 +33,19 @@ class Export:
     """Write a web page into this folder in which the run's policy.onnx flies. The browser simulates the vehicle and the
     task; wind, mass and delay can be changed. Open its index.html, or put the folder on any static web host."""
     vehicle: str | None = None
-    """The vehicle that flies in the page: a name or a .toml file. If omitted, the policy's own vehicle."""
+    """With --web: the vehicle that flies in the page. With --crazyflie: the vehicle whose mass and thrust count. A name
+    or a .toml file. If omitted, the policy's own vehicle."""
     c: Path | None = None
     """Write the run's policy.onnx as C99 code into this folder, with its contract as a header and a program that checks
     and times it. The code depends only on <math.h> and allocates no memory. See docs/onboard.md."""
     name: str = "policy"
     """With --c: the name for the files and the prefix of all symbols."""
-    precision: Precision = "double"
+    precision: Precision | None = None
     """With --c: the precision of the network's computation. double: within 1e-6 of the exact result of the file. float:
-    as near as ONNX Runtime, a few 1e-6, for processors that only compute in single precision."""
+    as near as ONNX Runtime, a few 1e-6, for processors that only compute in single precision. If omitted, double; with
+    --crazyflie, float."""
+    crazyflie: bool = False
+    """With --c: also write an app of the Crazyflie's firmware that flies the policy on board. See docs/crazyflie.md."""
     memory: float | None = None
     """With --c: memory of the target for the policy's state and images, KiB. A policy that needs more is refused."""
     flash: float | None = None
@@ -49,11 +56,13 @@ def run(options: Export) -> int:
     """Write policy.onnx from a checkpoint or from a file of an older e2efly, or a web page, or C code: see `Export`."""
     if options.c is not None:
         return _write_c(options, options.c)
-    _without_effect(options, ("name", "precision", "memory", "flash"), "has no effect without --c")
+    _without_effect(options, ("name", "precision", "crazyflie", "memory", "flash"), "has no effect without --c")
     if options.web is not None:
         return _write_page(options, options.web)
     if options.vehicle is not None:
-        raise ValueError(f"--vehicle is {options.vehicle!r}; accepted: with --web alone: policy.onnx names its own")
+        raise ValueError(
+            f"--vehicle is {options.vehicle!r}; accepted: with --web or --crazyflie: policy.onnx names its own"
+        )
     console, out = Terminal(), options.out
     if not options.run.exists():
         file = policy_file(options.run)
@@ -99,12 +108,30 @@ def _write_page(options: Export, folder: Path) -> int:
 
 def _write_c(options: Export, folder: Path) -> int:
     why = "has no effect with --c: the policy.onnx that there is becomes C"
-    _without_effect(options, ("out", "which", "web", "vehicle"), why)
+    _without_effect(options, ("out", "which", "web"), why)
+    if options.vehicle is not None and not options.crazyflie:
+        raise ValueError(f"--vehicle is {options.vehicle!r}; accepted: with --web or --crazyflie")
+    from e2efly.policy.c_export.crazyflie_app import check_app, write_app
     from e2efly.policy.c_export.write import write_c
 
     file, name = policy_file(options.run), options.name
-    needs = write_c(folder, file, name, options.precision, options.memory, options.flash)
+    contract = load_policy(file).contract
+    vehicle = None
+    if options.crazyflie:
+        check_app(contract)
+        if contract.vehicle_ranges is not None and options.vehicle is None:
+            raise ValueError("--vehicle is left out; accepted: a name or .toml file, as the policy flies any vehicle")
+        vehicle = load_vehicle(options.vehicle or contract.vehicle)
+        check_quadrotor(vehicle, "--crazyflie")
+    precision = options.precision or ("float" if options.crazyflie else "double")
+    needs = write_c(folder, file, name, precision, options.memory, options.flash)
     console = Terminal()
+    if vehicle is not None:
+        write_app(folder, contract, name, vehicle)
+        console.print(
+            f"Wrote an app of the Crazyflie's firmware: {name}_app.c, Kbuild, app-config and Makefile. Build it: "
+            f"make -C {folder} CRAZYFLIE_BASE=path/to/crazyflie-firmware"
+        )
     console.print(f"Wrote {file} as C to {folder}: {name}.h, {name}.c and {name}_check.c")
     console.print(
         f"It needs {needs.state} bytes of state, {needs.images} of images and {needs.constants} of weights and tables. "

@@ -8,7 +8,7 @@ from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, 
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.descent_plan import DescentWatchdog
 from e2efly.flight.betaflight.watchdog import WatchedLink
-from e2efly.flight.crazyflie.crazyflie import Crazyflie
+from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
 from e2efly.flight.crazyflie.crtp_link import CRAZYFLIE, RADIO, open_crtp
 from e2efly.flight.crazyflie.words import Words
 from e2efly.flight.flight_loop import Watchdog

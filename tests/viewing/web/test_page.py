@@ -66,4 +66,4 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.Captu
 
 def test_a_vehicle_without_a_page_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", "hover", "--vehicle", "vis_h"]) == 2
-    assert "--vehicle is 'vis_h'; accepted: with --web alone" in " ".join(capsys.readouterr().err.split())
+    assert "--vehicle is 'vis_h'; accepted: with --web or --crazyflie" in " ".join(capsys.readouterr().err.split())

@@ -16,7 +16,7 @@ FORMATS = {
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableEntry:
     """One parameter or log variable."""
 
     name: str
@@ -37,7 +37,7 @@ class Entry:
         return float(struct.unpack_from("<" + self.format, data)[0])
 
 
-def entry(port: int, data: bytes) -> Entry | None:
+def entry(port: int, data: bytes) -> TableEntry | None:
     """The entry in an answer of ITEM: number, type, group and name. None: it is of no known form."""
     if len(data) < 6 or data[0] != ITEM:
         return None
@@ -47,4 +47,4 @@ def entry(port: int, data: bytes) -> Entry | None:
     if kind not in kinds:
         return None
     name = b".".join((group, variable)).decode("ascii", "replace")
-    return Entry(name, int.from_bytes(data[1:3], "little"), kind, kinds[kind])
+    return TableEntry(name, int.from_bytes(data[1:3], "little"), kind, kinds[kind])

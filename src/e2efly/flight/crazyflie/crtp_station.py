@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from e2efly.flight.autopilot import HOLE, arrived
 from e2efly.flight.clock import Clock
-from e2efly.flight.crazyflie.contents import INFO, ITEM, Entry, entry
+from e2efly.flight.crazyflie.contents import INFO, ITEM, TableEntry, entry
 from e2efly.flight.crazyflie.crtp import LINK_SERVICE, LOGS, PARAMETERS, PLATFORM, CrtpPacket, PacketReader
 from e2efly.flight.link import Link
 
@@ -58,10 +58,10 @@ class CrtpStation:
     """Number of packets so far that could not be read."""
     reader: PacketReader = field(default_factory=PacketReader)
     _versions: dict[int, bytes] = field(default_factory=dict)
-    _tables: dict[int, dict[int, Entry]] = field(default_factory=dict)
+    _tables: dict[int, dict[int, TableEntry]] = field(default_factory=dict)
     _sums: dict[int, bytes] = field(default_factory=dict)
     _values: dict[int, bytes] = field(default_factory=dict)
-    _blocks: dict[int, tuple[Entry, ...]] = field(default_factory=dict)
+    _blocks: dict[int, tuple[TableEntry, ...]] = field(default_factory=dict)
     _answers: dict[bytes, int] = field(default_factory=dict)
     _info: dict[int, bytes] = field(default_factory=dict)
     _echoed: deque[float] = field(default_factory=lambda: deque(maxlen=512))
@@ -118,7 +118,7 @@ class CrtpStation:
         )
         return None if missing else {name: self._versions[number] for name, number in VERSIONS.items()}
 
-    def read_table(self, port: int, timeout: float) -> dict[str, Entry] | None:
+    def read_table(self, port: int, timeout: float) -> dict[str, TableEntry] | None:
         """The table of parameters or log variables by name. If nothing comes for `timeout` s, None."""
         self._info.pop(port, None)
         if self._collected([port], lambda p: p in self._info, lambda p: CrtpPacket(p, 0, bytes([INFO])), timeout):
@@ -136,7 +136,7 @@ class CrtpStation:
         )
         return None if missing else {one.name: one for one in table.values()}
 
-    def read_parameters(self, wanted: Sequence[Entry], timeout: float) -> dict[str, float]:
+    def read_parameters(self, wanted: Sequence[TableEntry], timeout: float) -> dict[str, float]:
         """The values of parameters by name. Those that are not told are left out."""
         self._values.clear()
         entries = {one.id: one for one in wanted}
@@ -148,7 +148,7 @@ class CrtpStation:
         )
         return {one.name: one.value(self._values[n]) for n, one in entries.items() if n in self._values}
 
-    def start(self, blocks: Sequence[LogBlock], table: dict[str, Entry], timeout: float) -> str:
+    def start(self, blocks: Sequence[LogBlock], table: dict[str, TableEntry], timeout: float) -> str:
         """Let the Crazyflie send log blocks. Returns what is wrong; empty if nothing is."""
         self.latest.clear()
         self._answers.clear()

@@ -13,7 +13,7 @@ from e2efly.flight.pilot.flight_state import Mission
 
 
 @dataclass(frozen=True)
-class Wish:
+class TypedWish:
     """What the pilot wants."""
 
     armed: bool = False
@@ -21,19 +21,19 @@ class Wish:
     mission: Mission = Mission.LAND
 
 
-Wishes = Callable[[], Wish | None]
+Wishes = Callable[[], TypedWish | None]
 """The pilot's newest wish. None: the pilot is not heard."""
 
 
-def wish_of(word: str, before: Wish) -> Wish:
+def wish_of(word: str, before: TypedWish) -> TypedWish:
     """The wish after a word."""
     known = {
-        "arm": Wish(armed=True),
-        "off": Wish(),
-        "hover": Wish(before.armed, Mission.HOVER),
-        "policy": Wish(before.armed, Mission.POLICY),
+        "arm": TypedWish(armed=True),
+        "off": TypedWish(),
+        "hover": TypedWish(before.armed, Mission.HOVER),
+        "policy": TypedWish(before.armed, Mission.POLICY),
     }
-    return known.get(word.strip().lower(), Wish(before.armed))
+    return known.get(word.strip().lower(), TypedWish(before.armed))
 
 
 @dataclass
@@ -42,10 +42,10 @@ class Words:
 
     descriptor: int = 0
     """Where words are read: the standard input."""
-    _wish: Wish | None = field(default_factory=Wish)
+    _wish: TypedWish | None = field(default_factory=TypedWish)
     _rest: bytes = b""
 
-    def __call__(self) -> Wish | None:
+    def __call__(self) -> TypedWish | None:
         """The newest wish. This neither blocks nor raises."""
         try:
             if os.isatty(self.descriptor) and os.tcgetpgrp(self.descriptor) != os.getpgrp():

@@ -15,7 +15,7 @@ from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.crazyflie.crazyflie_needs import BEHAVIOUR, NEEDS, PROTOCOL, firmware_row
 from e2efly.flight.crazyflie.crtp import FULL, LOGS, PARAMETERS, arming, external_pose, setpoint
 from e2efly.flight.crazyflie.crtp_station import CrtpStation, LogBlock
-from e2efly.flight.crazyflie.words import Wish, Wishes
+from e2efly.flight.crazyflie.words import TypedWish, Wishes
 from e2efly.flight.link import Link
 from e2efly.flight.pilot.flight_state import Mission, Pilot
 from e2efly.flight.row import Row
@@ -62,7 +62,7 @@ class Crazyflie:
         self._map = tuple(float(k) for k in vehicle.thrust_map)
         self._posed = self._asked = -math.inf
         self._armed = self._refused = False
-        self._wish: Wish | None = None
+        self._wish: TypedWish | None = None
         self._land, self._closed = False, True
         self._logged: dict[int, float] = {}
         self._felt = -math.inf
