@@ -1,0 +1,4 @@
+"""RAPTOR's form of a policy: its network, its checkpoints, and its ONNX graph.
+
+J. Eschmann, D. Albani, G. Loianno, RAPTOR: A Foundation Policy for Quadrotor Control, 2025. Imports no JAX.
+"""
