@@ -7,7 +7,9 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, Features, Gru, Layers, View, Weights
+from e2efly.learning.raptor_actor import RaptorActor
 from e2efly.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
+from e2efly.policy.raptor.form import COLUMNS, FARTHEST, FASTEST, FIELDS, OUTPUTS, ROTOR_OF, UNITS
 from e2efly.simulation.sensors.eyes import image_shape
 
 OPERATORS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
@@ -66,6 +68,8 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
         images: the name of each camera's input.
     """
     graph, features, units = _Graph(), actor.features, actor.network.recurrent
+    if isinstance(actor, RaptorActor):
+        return _raptor_graph(graph, weights)
     operator = OPERATORS[actor.network.activation]
     _of_state(graph, features)
     seen = zip(images, features.views, weights.encoders, strict=True)
@@ -79,6 +83,31 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     memory = {MEMORY: (units,)} if units else {}
     action = {OUTPUT: (len(weights.head[-1][1]),)}
     return graph.whole(inputs | memory, action | ({NEXT_MEMORY: (units,)} if units else {}))
+
+
+def _raptor_graph(graph: _Graph, weights: Weights) -> onnx.GraphProto:
+    """The graph of a policy of RAPTOR's form: `RaptorFeatures`, then `RaptorActor`. Its action is clipped.
+
+    `e2efly.policy.raptor.network` reads its constants by name.
+    """
+    last = [COLUMNS["past_actions"][i] for i in ROTOR_OF]
+    for name, columns in (
+        ("error", COLUMNS["position_error"]),
+        ("velocity", COLUMNS["velocity"]),
+        ("rest", [*COLUMNS["body_rate"], *last]),
+    ):
+        graph.node("Gather", [INPUT, graph.constant(f"{name}_index", np.array(columns, np.int64))], name, axis=1)
+    graph.node("Mul", ["error", graph.constant("minus", np.float32(-1))], "offset")
+    shown = [graph.clip("offset", FARTHEST, "offset_shown"), _rotation(graph, COLUMNS["attitude"][0])]
+    shown += [graph.clip("velocity", FASTEST, "velocity_shown"), "rest"]
+    graph.node("Concat", shown, "features", axis=1)
+    assert weights.cell is not None
+    graph.layers(weights.encoders[0], "features", ["Relu"], "dense", "dense_")
+    graph.layers(weights.head, _remembered(graph, weights.cell, "dense"), ["Identity"], "rotors")
+    index = graph.constant("rotor_index", np.array(ROTOR_OF, np.int64))
+    graph.clip(graph.node("Gather", ["rotors", index], "unclipped", axis=1), 1.0, OUTPUT)
+    inputs: dict[str, tuple[int, ...]] = {INPUT: (sum(FIELDS.values()),), MEMORY: (UNITS,)}
+    return graph.whole(inputs, {OUTPUT: (OUTPUTS,), NEXT_MEMORY: (UNITS,)})
 
 
 def perceptron_graph(
@@ -193,14 +222,8 @@ def _of_state(graph: _Graph, features: Features) -> None:
     order = [place[i] for _, where in columns for i in where if i in place]
     scale = [1.0 if f.frame == "world_body" else f.scale for f, where in columns for i in where if i in place]
 
-    table = np.zeros((len(_PAIRS), 9), np.float32)
-    for entry, terms in enumerate(_R_WORLD_BODY):
-        for sign, pair in ((terms[0], terms[1:3]), (terms[3], terms[4:6])):
-            table[_PAIRS.index(pair), entry] = 2.0 if sign == "+" else -2.0
-    first, second = ([attitude + "wxyz".index(pair[i]) for pair in _PAIRS] for i in (0, 1))
+    _rotation(graph, attitude)
     for name, index in (
-        ("first_index", first),
-        ("second_index", second),
         ("up_index", [6, 7, 8]),
         ("vectors_index", vectors),
         ("rest_index", rest),
@@ -210,12 +233,7 @@ def _of_state(graph: _Graph, features: Features) -> None:
         ("flat_shape", [0, len(vectors)]),
     ):
         graph.constant(name, np.array(index, np.int64))
-    for name, value in (("table", table), ("identity", np.eye(3).reshape(9)), ("scale", scale)):
-        graph.constant(name, np.array(value, np.float32))
-    graph.node("Gather", [INPUT, "first_index"], "first", axis=1)
-    graph.node("Gather", [INPUT, "second_index"], "second", axis=1)
-    graph.node("Mul", ["first", "second"], "products")
-    graph.node("Gemm", ["products", "table", "identity"], "R_flat")
+    graph.constant("scale", np.array(scale, np.float32))
     graph.node("Gather", ["R_flat", "up_index"], "up", axis=1)
     graph.node("Reshape", ["R_flat", "matrix_shape"], "R_world_body")
     graph.node("Gather", [INPUT, "vectors_index"], "vectors_flat", axis=1)
@@ -227,3 +245,18 @@ def _of_state(graph: _Graph, features: Features) -> None:
     graph.node("Concat", ["turned", "up", "rest"], "parts", axis=1)
     graph.node("Gather", ["parts", "order"], "ordered", axis=1)
     graph.node("Div", ["ordered", "scale"], "features")
+
+
+def _rotation(graph: _Graph, attitude: int) -> str:
+    """Add the rotation matrix R_world_body, row by row, of the quaternion that begins at a column of the observation."""
+    table = np.zeros((len(_PAIRS), 9), np.float32)
+    for entry, terms in enumerate(_R_WORLD_BODY):
+        for sign, pair in ((terms[0], terms[1:3]), (terms[3], terms[4:6])):
+            table[_PAIRS.index(pair), entry] = 2.0 if sign == "+" else -2.0
+    for i, name in enumerate(("first", "second")):
+        index = [attitude + "wxyz".index(pair[i]) for pair in _PAIRS]
+        graph.node("Gather", [INPUT, graph.constant(f"{name}_index", np.array(index, np.int64))], name, axis=1)
+    graph.node("Mul", ["first", "second"], "products")
+    graph.constant("table", table)
+    graph.constant("identity", np.eye(3, dtype=np.float32).reshape(9))
+    return graph.node("Gemm", ["products", "table", "identity"], "R_flat")

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 from e2efly.config import CameraConfig, NetworkConfig, check_fields
 from e2efly.learning.networks import Actor, Features, Gru, Weights, init_mlp
 from e2efly.policy.observation import Field
-from e2efly.policy.raptor.form import FARTHEST, FASTEST, FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS
-from e2efly.simulation.physics.rotation import to_matrix
+from e2efly.policy.raptor.form import FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS, inputs_of
+from e2efly.policy.raptor.network import Parameters, other_gates
 
 
 def actor_of(fields: tuple[Field, ...], cameras: Sequence[CameraConfig], network: NetworkConfig) -> Actor:
@@ -47,11 +47,7 @@ class RaptorFeatures(Features):
 
     def of_state(self, observation: Float[Array, "*n o"]) -> Float[Array, "*n s"]:
         """The inputs for an observation."""
-        ends = np.cumsum(list(FIELDS.values()))[:-1]
-        error, quaternion, velocity, rate, last = jnp.split(observation, ends, axis=-1)
-        turn = to_matrix(quaternion).reshape(*quaternion.shape[:-1], 9)
-        error, velocity = jnp.clip(-error, -FARTHEST, FARTHEST), jnp.clip(velocity, -FASTEST, FASTEST)
-        return jnp.concatenate([error, turn, velocity, rate, last[..., jnp.array(ROTOR_OF)]], axis=-1)
+        return inputs_of(observation)
 
 
 @dataclass(frozen=True)
@@ -75,3 +71,12 @@ class RaptorActor(Actor):
         (weight, bias), (last, last_bias) = weights.encoders[0][0], weights.head[0]
         memory = weights.cell(jax.nn.relu(features @ weight + bias), memory)
         return (memory @ last + last_bias)[..., jnp.array(ROTOR_OF)], memory
+
+
+def weights_of(parameters: Parameters) -> Weights:
+    """The weights that a checkpoint's parameters are."""
+    p = parameters
+    first = [(p["layers/0/weights"].T, p["layers/0/biases"])]
+    names = "weights_input", "weights_hidden", "biases_input", "biases_hidden"
+    cell = Gru(*(other_gates(p[f"layers/1/{name}"]).T for name in names))
+    return Weights((first,), cell, [(p["layers/2/weights"].T, p["layers/2/biases"])])

@@ -8,7 +8,9 @@ Commands are shares of the rotor speed: -1 stands still, 1 is full speed.
 """
 
 from collections.abc import Sequence
+from itertools import accumulate
 
+from e2efly.control.vectors import Array, namespace
 from e2efly.policy.observation import Field
 
 INPUTS, UNITS, OUTPUTS = 22, 16, 4
@@ -25,6 +27,25 @@ right, rear left, front left. It is its own inverse."""
 FIELDS = {"position_error": 3, "attitude": 4, "velocity": 3, "body_rate": 3, "past_actions": 4}
 """The observation from which the inputs are computed, with the sizes of its fields. The yaw of the target is the
 world's x axis."""
+COLUMNS = {
+    name: tuple(range(end - size, end))
+    for (name, size), end in zip(FIELDS.items(), accumulate(FIELDS.values()), strict=True)
+}
+"""The columns of each field in the observation."""
+
+
+def inputs_of(observation: Array) -> Array:
+    """The inputs of the network, (*n, 22), for observations, (*n, 17), in the library of the array."""
+    xp = namespace(observation)
+    error, quaternion, velocity, rate, last = (observation[..., list(at)] for at in COLUMNS.values())
+    w, x, y, z = (quaternion[..., i] for i in range(4))
+    rows = [
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ]  # fmt: skip
+    shown = xp.clip(-error, -FARTHEST, FARTHEST), xp.stack(rows, axis=-1), xp.clip(velocity, -FASTEST, FASTEST)
+    return xp.concatenate([*shown, rate, last[..., list(ROTOR_OF)]], axis=-1)
 
 
 def check_form(fields: Sequence[Field], rate: float, mode: str) -> None:
