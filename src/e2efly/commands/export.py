@@ -135,7 +135,7 @@ def _write_raptor(options: Export, path: Path) -> int:
     why = "has no effect with --raptor: the policy.onnx that there is becomes a checkpoint"
     _without_effect(options, ("out", "which", "web", "vehicle"), why)
     from e2efly.policy.loader import load_policy
-    from e2efly.policy.raptor.checkpoint import write_checkpoint
+    from e2efly.policy.raptor.raptor_checkpoint import write_checkpoint
 
     file = policy_file(options.run)
     write_checkpoint(path, load_policy(file), options.name)

@@ -9,7 +9,7 @@ from onnx import TensorProto, helper, numpy_helper
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, Features, Gru, Layers, View, Weights
 from e2efly.learning.raptor_actor import RaptorActor
 from e2efly.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
-from e2efly.policy.raptor.form import COLUMNS, FARTHEST, FASTEST, FIELDS, OUTPUTS, ROTOR_OF, UNITS
+from e2efly.policy.raptor.raptor_form import COLUMNS, FARTHEST, FASTEST, FIELDS, OUTPUTS, ROTOR_OF, UNITS
 from e2efly.simulation.sensors.eyes import image_shape
 
 OPERATORS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
@@ -88,7 +88,7 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
 def _raptor_graph(graph: _Graph, weights: Weights) -> onnx.GraphProto:
     """The graph of a policy of RAPTOR's form: `RaptorFeatures`, then `RaptorActor`. Its action is clipped.
 
-    `e2efly.policy.raptor.network` reads its constants by name.
+    `e2efly.policy.raptor.raptor_network` reads its constants by name.
     """
     last = [COLUMNS["past_actions"][i] for i in ROTOR_OF]
     for name, columns in (
@@ -248,7 +248,7 @@ def _of_state(graph: _Graph, features: Features) -> None:
 
 
 def _rotation(graph: _Graph, attitude: int) -> str:
-    """Add the rotation matrix R_world_body, row by row, of the quaternion that begins at a column of the observation."""
+    """Add R_world_body, row by row, of the quaternion that begins at this column of the observation."""
     table = np.zeros((len(_PAIRS), 9), np.float32)
     for entry, terms in enumerate(_R_WORLD_BODY):
         for sign, pair in ((terms[0], terms[1:3]), (terms[3], terms[4:6])):

@@ -1,4 +1,4 @@
-"""RAPTOR's form (`e2efly.policy.raptor.form`) as a policy that learns."""
+"""RAPTOR's form (`e2efly.policy.raptor.raptor_form`) as a policy that learns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 from e2efly.config import CameraConfig, NetworkConfig, check_fields
 from e2efly.learning.networks import Actor, Features, Gru, Weights, init_mlp
 from e2efly.policy.observation import Field
-from e2efly.policy.raptor.form import FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS, inputs_of
-from e2efly.policy.raptor.network import Parameters, other_gates
+from e2efly.policy.raptor.raptor_form import FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS, inputs_of
+from e2efly.policy.raptor.raptor_network import Parameters, other_gates
 
 
 def actor_of(fields: tuple[Field, ...], cameras: Sequence[CameraConfig], network: NetworkConfig) -> Actor:

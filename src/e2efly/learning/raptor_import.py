@@ -5,7 +5,7 @@ from pathlib import Path
 from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.learning.raptor_actor import weights_of
 from e2efly.learning.setup import Setup
-from e2efly.policy.raptor.checkpoint import read_checkpoint
+from e2efly.policy.raptor.raptor_checkpoint import read_checkpoint
 from e2efly.runs.presets import preset
 
 PRESET = "raptor"

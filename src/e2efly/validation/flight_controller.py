@@ -55,7 +55,7 @@ class FlightController:
     def _thrust(self, command: float) -> float:
         """Thrust that a rotor's command asks for, N."""
         if self._of_largest == "speed":
-            return self._vehicle.rotor_thrust(command * self._full)
+            return self._vehicle.rotor_thrust(max(command, 0.0) * self._full)
         return command * self._high if self._of_largest == "thrust" else command
 
 

@@ -9,7 +9,7 @@ import onnx
 from onnx import numpy_helper
 
 from e2efly.policy.loader import Policy
-from e2efly.policy.raptor.form import INPUTS, OUTPUTS, ROTOR_OF, UNITS, check_form, inputs_of
+from e2efly.policy.raptor.raptor_form import INPUTS, OUTPUTS, ROTOR_OF, UNITS, check_form, inputs_of
 
 Parameters = Mapping[str, np.ndarray]
 """The parameters of a network, float32, by their path in a checkpoint: the keys of `SHAPES`, in its order."""
@@ -52,9 +52,9 @@ def check_parameters(parameters: Parameters) -> None:
     Raises:
         ValueError: naming the parameter, its shape or value, and what is accepted.
     """
-    if unknown := sorted(set(parameters) ^ set(SHAPES)):
-        raise ValueError(f"{unknown[0]}: is missing, or one too many; accepted in RAPTOR's form: {', '.join(SHAPES)}")
     for name, shape in SHAPES.items():
+        if name not in parameters:
+            raise ValueError(f"{name} is missing; accepted in RAPTOR's form: {', '.join(SHAPES)}")
         if parameters[name].shape != shape:
             raise ValueError(f"{name} has shape {parameters[name].shape}; accepted in RAPTOR's form: {shape}")
         if not np.isfinite(parameters[name]).all():
@@ -113,6 +113,6 @@ def _check_agreement(policy: Policy, parameters: Parameters) -> None:
     off = np.abs(np.stack(acted) - np.clip(commands(parameters, inputs_of(shown))[..., list(ROTOR_OF)], -1, 1)).max()
     if not off <= AGREES:
         raise ValueError(
-            f"the graph computes something else than RAPTOR's form does with its weights: commands differ by {off:.2g}; "
-            f"accepted: at most {AGREES:g}, as of a policy that was trained with network.form 'raptor'"
+            f"its graph computes something else than RAPTOR's form does with its weights: commands differ by "
+            f"{off:.2g}; accepted: at most {AGREES:g}, as of a policy that was trained with network.form 'raptor'"
         )

@@ -1,5 +1,5 @@
-"""Checkpoints of RLtools that hold a policy of RAPTOR's form: the tar that PX4's `mc_raptor` reads, and the HDF5 file of
-the Python package `foundation-policy`.
+"""Checkpoints of RLtools that hold a policy of RAPTOR's form: the tar that PX4's `mc_raptor` reads, and the HDF5 file
+of the Python package `foundation-policy`.
 
 In a tar, a group is a path: each array of a group is NAME/data, its numbers in the order of the rows, float32 and
 little-endian, beside NAME/meta, lines of text that say its shape. A group's own attributes are its meta. As RLtools
@@ -7,8 +7,8 @@ writes it (rl-tools at 9acdf5c8, include/rl_tools/persist/backends/tar, nn/layer
 src/nn_models/port_checkpoint/raptor/main.cpp, read 2026-11-29).
 
 Both hold an example: a sequence of inputs and the outputs that belong to them. PX4 runs the first five steps of its two
-rows at every start, and refuses the checkpoint if the outputs differ by 1e-5 or more on average; the package runs all of
-it, and accepts 1e-6.
+rows at every start, and refuses the checkpoint if the outputs differ by 1e-5 or more on average. The package runs all
+of it, and accepts 1e-6.
 """
 
 import io
@@ -22,8 +22,8 @@ import numpy as np
 from e2efly.config.storage import write_atomically
 from e2efly.policy.loader import Policy
 from e2efly.policy.raptor import HDF5, TAR
-from e2efly.policy.raptor.form import INPUTS
-from e2efly.policy.raptor.network import SHAPES, Parameters, check_parameters, commands, parameters_of
+from e2efly.policy.raptor.raptor_form import INPUTS
+from e2efly.policy.raptor.raptor_network import SHAPES, Parameters, check_parameters, commands, parameters_of
 
 EXAMPLE = 500, 2, INPUTS
 """Shape of the example's inputs: steps, rows, inputs. PX4 compiles it in."""
@@ -119,22 +119,17 @@ def _lines(attributes: Mapping[str, Any]) -> bytes:
 
 def _of_tar(path: Path) -> dict[str, np.ndarray]:
     with tarfile.open(path) as tar:
-        files = {member.name: member for member in tar.getmembers() if member.isfile()}
-
-        def content(name: str) -> bytes:
-            file = tar.extractfile(files[name]) if name in files else None
-            if file is None:
-                raise ValueError(f"has no {name}; accepted: a checkpoint of RAPTOR's form")
-            return file.read()
-
-        found = {}
-        for name in SHAPES:
-            lines = content(f"actor/{name}/parameters/meta").decode("ascii").splitlines()
-            about = dict(line.split(": ", 1) for line in lines)
+        files = {member.name: tar.extractfile(member) for member in tar.getmembers() if member.isfile()}
+        content = {name: file.read() for name, file in files.items() if file is not None}
+    found = {}
+    for name in SHAPES:
+        where = f"actor/{name}/parameters"
+        if f"{where}/meta" in content and f"{where}/data" in content:
+            about = dict(line.split(": ", 1) for line in content[f"{where}/meta"].decode("ascii").splitlines())
             if about.get("dtype") != "float32":
                 raise ValueError(f"{name} has dtype {about.get('dtype')}; accepted: float32")
             shape = [int(about[f"dim_{i}"]) for i in range(int(about["num_dims"]))]
-            found[name] = np.frombuffer(content(f"actor/{name}/parameters/data"), "<f4").reshape(shape)
+            found[name] = np.frombuffer(content[f"{where}/data"], "<f4").reshape(shape)
     return found
 
 
@@ -155,10 +150,8 @@ def _hdf5(parameters: Parameters, example: Parameters, name: str) -> bytes:
 
 def _of_hdf5(path: Path) -> dict[str, np.ndarray]:
     with _h5py().File(path) as file:
-        try:
-            return {name: np.asarray(file[f"actor/{name}/parameters"]) for name in SHAPES}
-        except KeyError as error:
-            raise ValueError(f"{error.args[0]}; accepted: a checkpoint of RAPTOR's form") from None
+        places = {name: f"actor/{name}/parameters" for name in SHAPES}
+        return {name: np.asarray(file[where]) for name, where in places.items() if where in file}
 
 
 def _h5py() -> Any:
