@@ -1,5 +1,6 @@
 """RAPTOR's form: its checkpoints as PX4's mc_raptor and the Python package read them, and theirs as policies."""
 
+import dataclasses
 import tarfile
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import foundation_policy
 import h5py
 import jax
+import jax.numpy as jnp
 import numpy as np
 import onnx
 import pytest
@@ -16,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from e2efly.commands.cli import run
 from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.learning.setup import Setup
+from e2efly.learning.warm_start import started_from
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.onnx_file import sealed
 from e2efly.runs.presets import preset
@@ -214,3 +217,16 @@ def test_a_network_of_another_size_is_refused_before_it_trains(capsys: pytest.Ca
     assert run(["train", "hover", "--preset", "raptor", "--network.recurrent", "32"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "network.recurrent is 32; accepted with network.form 'raptor': 16" in said
+
+
+def test_a_training_starts_from_a_checkpoint_of_the_form(policy: Path) -> None:
+    config = dataclasses.replace(preset("hover", "bptt", "raptor"), start_from=str(policy))
+    setup = Setup.of(config)
+    begun = started_from(setup.parameters(), policy, setup)
+    seen, ours = observations(load_policy(policy)), load_policy(policy)
+    memory, acted = setup.actor.memory(8), []
+    for observation in seen:
+        action, memory = setup.actor(begun.policy, setup.actor.features(jnp.asarray(observation)), memory)
+        acted.append(np.clip(action, -1, 1))
+    own = [ours.contract.action.fields.index(name) for name in ORDER]
+    np.testing.assert_allclose(np.stack(acted)[..., own], flown(ours, seen), atol=1e-5)
