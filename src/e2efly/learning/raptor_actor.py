@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.config import CameraConfig, NetworkConfig, check_fields
-from e2efly.learning.networks import Actor, Features, Gru, Weights, init_mlp
+from e2efly.learning.networks import Actor, Features, Gru, Layers, Weights, init_mlp
 from e2efly.policy.observation import Field
 from e2efly.policy.raptor.raptor_form import FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS, inputs_of
 from e2efly.policy.raptor.raptor_network import Parameters, other_gates
@@ -76,7 +76,7 @@ class RaptorActor(Actor):
 def weights_of(parameters: Parameters) -> Weights:
     """The weights that a checkpoint's parameters are."""
     p = parameters
-    first = [(p["layers/0/weights"].T, p["layers/0/biases"])]
+    first: Layers = [(p["layers/0/weights"].T, p["layers/0/biases"])]
     names = "weights_input", "weights_hidden", "biases_input", "biases_hidden"
     cell = Gru(*(other_gates(p[f"layers/1/{name}"]).T for name in names))
     return Weights((first,), cell, [(p["layers/2/weights"].T, p["layers/2/biases"])])
