@@ -14,6 +14,9 @@ from e2efly.policy.observation import Field
 from e2efly.policy.raptor.raptor_form import FIELDS, INPUTS, OUTPUTS, ROTOR_OF, UNITS, inputs_of
 from e2efly.policy.raptor.raptor_network import Parameters, other_gates
 
+SHORTEST, LONGEST = 0.3, 100.0
+"""Time constants of the GRU's units in a fresh network, control steps."""
+
 
 def actor_of(fields: tuple[Field, ...], cameras: Sequence[CameraConfig], network: NetworkConfig) -> Actor:
     """The policy of an environment's observation and cameras, in the network's form.
@@ -55,13 +58,19 @@ class RaptorActor(Actor):
     """The network. Of its weights, `encoders` holds the dense layer before the GRU."""
 
     def init(self, rng: np.random.Generator, hover: np.ndarray) -> Weights:
-        """Initial weights. The policy starts with actions near `hover`."""
+        """Initial weights. The policy starts with actions near `hover`.
+
+        Everything passes through the GRU, so that some of its units have to answer at once and others to remember how
+        the vehicle has answered. Their time constants begin spread out, up to `LONGEST` (as by C. Tallec and Y.
+        Ollivier, Can recurrent neural networks warp time?, 2018).
+        """
         first = init_mlp(rng, (INPUTS, UNITS), 2.0**0.5)
         of_input, of_memory = (init_mlp(rng, (UNITS, 3 * UNITS), 1.0)[0][0] for _ in range(2))
-        zero = np.zeros(3 * UNITS, np.float32)
+        bias = np.zeros(3 * UNITS, np.float32)
+        bias[:UNITS] = np.log(np.geomspace(SHORTEST, LONGEST, UNITS))  # of the gate that keeps the memory
         weight, _ = init_mlp(rng, (UNITS, OUTPUTS), 0.01)[0]
-        bias = np.asarray(hover, np.float32)[list(ROTOR_OF)]
-        return Weights((first,), Gru(of_input, of_memory, zero, zero), [(weight, bias)])
+        cell = Gru(of_input, of_memory, bias, np.zeros_like(bias))
+        return Weights((first,), cell, [(weight, np.asarray(hover, np.float32)[list(ROTOR_OF)])])
 
     def __call__(
         self, weights: Weights, features: Float[Array, "*n f"], memory: Float[Array, "*n k"]
