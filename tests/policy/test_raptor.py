@@ -16,12 +16,14 @@ from onnx import numpy_helper
 from scipy.spatial.transform import Rotation
 
 from e2efly.commands.cli import run
+from e2efly.environment import random_key
 from e2efly.learning.onnx_export import contract_of, export_policy
 from e2efly.learning.setup import Setup
 from e2efly.learning.warm_start import started_from
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.onnx_file import sealed
 from e2efly.runs.presets import preset
+from e2efly.simulation.physics.rotation import yaw
 
 PUBLISHED = Path(foundation_policy.__file__).parent / "blob" / "checkpoint.h5"
 ORDER = "front_right", "rear_right", "rear_left", "front_left"
@@ -230,3 +232,11 @@ def test_a_training_starts_from_a_checkpoint_of_the_form(policy: Path) -> None:
         acted.append(np.clip(action, -1, 1))
     own = [ours.contract.action.fields.index(name) for name in ORDER]
     np.testing.assert_allclose(np.stack(acted)[..., own], flown(ours, seen), atol=1e-5)
+
+
+def test_the_preset_starts_within_a_heading_that_is_an_option() -> None:
+    config = preset("hover", "bptt", "raptor")
+    state, _ = Setup.of(config).env.reset(random_key(0), 500)
+    heading = np.abs(np.asarray(yaw(state.vehicle.quaternion)))
+    assert 0.7 < heading.max() < 0.85
+    assert (config.env.vehicle, config.env.control_rate, config.env.action_latency) == ("any", 100.0, (0.0, 0.034))
