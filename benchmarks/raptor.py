@@ -129,7 +129,7 @@ def main() -> None:
                 rows.append(row(name, starts, delay, fly(env, act_of(flown), drawn), known))
                 print(rows[-1], flush=True)
     print(table(rows))
-    write("raptor", options.json, {"table": rows, "vehicles": options.vehicles})
+    write("raptor", options.json, {"table": rows, "vehicles": options.vehicles, "seed": SEED})
 
 
 if __name__ == "__main__":
