@@ -64,8 +64,8 @@ class HoverConfig(TaskConfig):
     )
     raptor: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05, "ori1": 0.2},
-        algo={"horizon": 240, "learning_rate": 6e-3, "average": 0.99, "gamma": 0.995},
-        steps=40_000_000,
+        algo={"horizon": 240, "learning_rate": 6e-3, "average": 0.99, "gamma": 0.995, "gradient_decay": 1.5},
+        steps=60_000_000,
         chunk=150,
         recurrent=16,
         hidden=(16,),
