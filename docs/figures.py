@@ -106,7 +106,7 @@ POLICIES = {
         ("cold_start", "robust", "firmware_faults", "process_faults", "watch", "bridge_loop"), "preset robust"
     ),
     "rates": "preset nominal", "time_to_criterion": "presets nominal and thrown", "thrown": "preset thrown",
-    "any_track": "preset any_track", "raptor": f"preset rotors and {ZOO}", "tune": "preset identified",
+    "any_track": "preset any_track", "raptor": f"preset raptor and {ZOO}", "tune": "preset identified",
     "zoo_stress": f"{ZOO}, and preset nominal",
 }  # fmt: skip
 """The policies of each table: presets by which they were trained, the zoo's, or none."""

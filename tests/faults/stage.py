@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from e2efly.flight.betaflight.descent_plan import plan_of
+from e2efly.flight.descent_plan import plan_of
 from e2efly.flight.flight_loop import PLAN_PERIOD
 from e2efly.flight.link import open_link
 from e2efly.flight.pilot.flight_state import Mode, Reason

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from e2efly.flight.betaflight.descent_plan import plan_of
+from e2efly.flight.descent_plan import plan_of
 from e2efly.flight.flight_loop import fly
 from e2efly.flight.pilot.flight_state import Flight, Mode
 from e2efly.flight.pilot.inertial import Inertial

@@ -62,7 +62,7 @@ def environment(**options: object) -> Env:
 
 
 @pytest.mark.whole(but=1)
-@pytest.mark.parametrize("mode", ["ctbr", "rotor_share"])
+@pytest.mark.parametrize("mode", ["ctbr", "rotor_share", "rotor_speed"])
 def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(mode: str) -> None:
     """Plant, mixer and rate loop of each are those of the vehicle that was drawn."""
     env, rng = environment(command_mode=mode), np.random.default_rng(0)
@@ -141,7 +141,7 @@ def test_without_disturbances_vehicles_and_delays_are_drawn_still() -> None:
 
 def test_a_mode_whose_commands_differ_from_vehicle_to_vehicle_is_refused() -> None:
     with pytest.raises(
-        ValueError, match=r"env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr' or 'rotor_share'"
+        ValueError, match=r"env.command_mode is 'rotor_thrust'; accepted for vehicle 'any': 'ctbr', 'rotor_share'"
     ):
         environment(command_mode="rotor_thrust")
 

@@ -27,7 +27,7 @@ def known() -> list[tuple[str, str, str]]:
         for name, task in TASKS.items()
         for algo in ("ppo", "bptt")
         for preset in (presets.NOMINAL, *task.variants, *([presets.ROBUST] if algo in task.robust else []))
-        if (algo, preset) not in (("ppo", "rotors"), ("ppo", "lost_rotor"))
+        if (algo, preset) not in (("ppo", "rotors"), ("ppo", "raptor"), ("ppo", "lost_rotor"))
     ]
 
 

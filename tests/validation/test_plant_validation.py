@@ -68,3 +68,10 @@ def test_bad_input_is_told(policy_of: Callable[..., Path], tmp_path: Path) -> No
     ):
         with pytest.raises((ValueError, OSError), match=said):
             validate(**({"policy": hover, "plant": "mujoco"} | options))
+
+
+def test_rotor_commands_fly_on_a_plant_that_takes_them() -> None:
+    found = validate("any/hover_rotors", "mujoco", episodes=4, vehicle="crazyflie").criteria["hover"]
+    assert found.flown.success.all()
+    with pytest.raises(ValueError, match="plant 'betaflight' takes no 'rotor_share' commands"):
+        validate("any/hover_rotors", "betaflight", episodes=1, vehicle="crazyflie")

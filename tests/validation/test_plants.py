@@ -195,6 +195,7 @@ def test_rate_loop_and_mixer_are_the_simulators(vis_r: Vehicle) -> None:
     ("mode", "command"),
     [
         ("rotor_thrust", [1.9, 1.9, 1.85, 1.85]),
+        ("rotor_speed", [0.62, 0.62, 0.61, 0.61]),
         ("attitude", [10.5, 0.2, -0.3, 0.4]),
         ("acceleration", [2.0, -1.0, 0.5, 0.3]),
         ("velocity", [1.0, 0.5, -0.5, 0.2]),

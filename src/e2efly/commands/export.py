@@ -11,6 +11,7 @@ from e2efly.commands.terminal import Terminal
 from e2efly.config.storage import write_atomically
 from e2efly.policy.c_export.header import Precision
 from e2efly.policy.loader import load_policy
+from e2efly.policy.raptor import HDF5, TAR
 from e2efly.policy.zoo import beside, policy_file
 from e2efly.simulation.device import prepare
 from e2efly.vehicles.loading import load_vehicle
@@ -19,11 +20,14 @@ from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 @dataclass(frozen=True)
 class Export:
-    """Write policy.onnx from the checkpoint of a run, or a web page in which a policy flies, or a policy as C code."""
+    """Write policy.onnx from the checkpoint of a run, or a web page in which a policy flies, or a policy as C code, or
+    for PX4's mc_raptor.
+    """
 
     run: tyro.conf.Positional[Annotated[Path, tyro.conf.arg(metavar="RUN|POLICY")]]
     """A run directory, or a policy's name in the zoo (hover, any/hover). Or a policy.onnx from an older e2efly: it gets
-    the digest that is checked on loading."""
+    the digest that is checked on loading. Or a checkpoint of RAPTOR's form, .tar or .h5, that becomes a policy.onnx
+    beside it."""
     out: Path | None = None
     """The file to write. If omitted, RUN/policy.onnx, or the older file itself. For a policy of the zoo,
     runs/zoo-TASK-VEHICLE/policy.onnx."""
@@ -38,8 +42,11 @@ class Export:
     c: Path | None = None
     """Write the run's policy.onnx as C99 code into this folder, with its contract as a header and a program that checks
     and times it. The code depends only on <math.h> and allocates no memory. See docs/onboard.md."""
+    raptor: Path | None = None
+    """Write a policy that was trained by `hover --preset raptor` for PX4's module mc_raptor, to a name that ends with
+    .tar, or for the Python package foundation-policy, to one that ends with .h5. See docs/onboard.md."""
     name: str = "policy"
-    """With --c: the name for the files and the prefix of all symbols."""
+    """With --c: the name for the files and the prefix of all symbols. With --raptor: the checkpoint's name."""
     precision: Precision | None = None
     """With --c: the precision of the network's computation. double: within 1e-6 of the exact result of the file. float:
     as near as ONNX Runtime, a few 1e-6, for processors that only compute in single precision. If omitted, double; with
@@ -56,7 +63,10 @@ def run(options: Export) -> int:
     """Write policy.onnx from a checkpoint or from a file of an older e2efly, or a web page, or C code: see `Export`."""
     if options.c is not None:
         return _write_c(options, options.c)
-    _without_effect(options, ("name", "precision", "crazyflie", "memory", "flash"), "has no effect without --c")
+    _without_effect(options, ("precision", "crazyflie", "memory", "flash"), "has no effect without --c")
+    if options.raptor is not None:
+        return _write_raptor(options, options.raptor)
+    _without_effect(options, ("name",), "has no effect without --c or --raptor")
     if options.web is not None:
         return _write_page(options, options.web)
     if options.vehicle is not None:
@@ -64,13 +74,21 @@ def run(options: Export) -> int:
             f"--vehicle is {options.vehicle!r}; accepted: with --web or --crazyflie: policy.onnx names its own"
         )
     console, out = Terminal(), options.out
-    if not options.run.exists():
+    if not options.run.exists() and options.run.suffix not in (TAR, HDF5):
         file = policy_file(options.run)
         path = out or beside(file) / "policy.onnx"
         _without_effect(options, ("which",), "has no effect on a policy of the zoo")
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, file.read_bytes())
         console.print(f"Wrote the zoo's policy {options.run} to {path}")
+        return 0
+    if options.run.suffix in (TAR, HDF5):
+        prepare("cpu")
+        from e2efly.learning.raptor_import import import_checkpoint
+
+        path = out or options.run.with_suffix(".onnx")
+        import_checkpoint(options.run, path)
+        console.print(f"Wrote the policy of {options.run} to {path}")
         return 0
     if options.run.is_file():
         from e2efly.policy.loader import sealed_policy
@@ -108,7 +126,7 @@ def _write_page(options: Export, folder: Path) -> int:
 
 def _write_c(options: Export, folder: Path) -> int:
     why = "has no effect with --c: the policy.onnx that there is becomes C"
-    _without_effect(options, ("out", "which", "web"), why)
+    _without_effect(options, ("out", "which", "web", "raptor"), why)
     if options.vehicle is not None and not options.crazyflie:
         raise ValueError(f"--vehicle is {options.vehicle!r}; accepted: with --web or --crazyflie")
     from e2efly.policy.c_export.crazyflie_app import check_app, write_app
@@ -137,6 +155,18 @@ def _write_c(options: Export, folder: Path) -> int:
         f"It needs {needs.state} bytes of state, {needs.images} of images and {needs.constants} of weights and tables. "
         f"Check it: cd {folder} && cc -O2 -std=c99 {name}.c {name}_check.c -lm -o check && ./check"
     )
+    return 0
+
+
+def _write_raptor(options: Export, path: Path) -> int:
+    why = "has no effect with --raptor: the policy.onnx that there is becomes a checkpoint"
+    _without_effect(options, ("out", "which", "web", "vehicle"), why)
+    from e2efly.policy.loader import load_policy
+    from e2efly.policy.raptor.raptor_checkpoint import write_checkpoint
+
+    file = policy_file(options.run)
+    write_checkpoint(path, load_policy(file), options.name)
+    Terminal().print(f"Wrote {file} as the checkpoint {options.name} to {path}")
     return 0
 
 

@@ -8,7 +8,7 @@ from e2efly.config.algorithms import ALGORITHMS, AlgorithmConfig
 from e2efly.config.domain import Domain
 from e2efly.config.drawing import Thing
 from e2efly.config.env import FILE, CameraConfig, EnvConfig
-from e2efly.config.numbers import check_fields, number
+from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.registry import absolute
 
 
@@ -45,6 +45,9 @@ class NetworkConfig:
     """Units of the layers that process each image before it joins the other inputs (sets shapes)."""
     recurrent: int = number(0, high=10**6)
     """Units of a gated recurrent unit (GRU) before the hidden layers. 0: no GRU (sets shapes)."""
+    form: Literal["features", "raptor"] = shape("features", added=True)
+    """raptor: exactly the network of RAPTOR, which PX4's mc_raptor flies: 22 inputs, 16 hidden units, a GRU of 16 after
+    them, 4 outputs (sets the program)."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ A mode is one entry of `COMMAND_MODES`. Simulator, contract, bridge and other pl
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -39,8 +40,9 @@ class CommandMode:
     fixed: tuple[str, ...] = ("origin_yaw",)
     """Options of a goal that would move the world under the command. They concern the world axes, which no policy
     observes."""
-    of_largest: bool = False
-    """Whether rotor thrusts are shares of the largest thrust. Otherwise they are in N."""
+    of_largest: Literal["thrust", "speed"] | None = None
+    """What the commands of the rotors are shares of: of the largest thrust, or of the rotor speed that gives it. None:
+    they are thrusts in N."""
 
     def of(self, rotor_count: int) -> "CommandMode":
         """The mode for vehicles with this number of rotors: only modes of rotor thrusts depend on it."""
@@ -111,7 +113,11 @@ COMMAND_MODES: dict[str, CommandMode] = {
         ),
         CommandMode(
             "rotor_share", ROTORS, ("1", "1", "1", "1"), lambda v, _: (list(_each(v, 0.0)), list(_each(v, 1.0))), None,
-            hover=lambda v: _each(v, 1 / v.thrust_to_weight), of_largest=True,
+            hover=lambda v: _each(v, 1 / v.thrust_to_weight), of_largest="thrust",
+        ),
+        CommandMode(
+            "rotor_speed", ROTORS, ("1", "1", "1", "1"), lambda v, _: (list(_each(v, 0.0)), list(_each(v, 1.0))), None,
+            hover=lambda v: _each(v, v.hover_rotor_speed / v.full_rotor_speed), of_largest="speed",
         ),
         CommandMode(
             "ctbr", (THRUST, "roll_rate", "pitch_rate", "yaw_rate"), ("m/s^2", *RATES),

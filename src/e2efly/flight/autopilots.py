@@ -6,11 +6,11 @@ from e2efly.config.registry import check_methods, load, referenced
 from e2efly.flight.autopilot import METHODS, Autopilot
 from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, check_hover
 from e2efly.flight.betaflight.client import SCHEDULE
-from e2efly.flight.betaflight.descent_plan import DescentWatchdog
 from e2efly.flight.betaflight.watchdog import WatchedLink
 from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
 from e2efly.flight.crazyflie.crtp_link import CRAZYFLIE, RADIO, open_crtp
 from e2efly.flight.crazyflie.words import Words
+from e2efly.flight.descent_plan import DescentWatchdog
 from e2efly.flight.flight_loop import Watchdog
 from e2efly.flight.link import Link, open_link
 from e2efly.flight.mavlink.mavlink import Mavlink

@@ -16,6 +16,7 @@ from e2efly.environment import Env
 from e2efly.environment.limits import limits_of, posterior_of, sensing_of, vehicles_of
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.learning.onnx_layers import policy_graph
+from e2efly.learning.raptor_actor import actor_of
 from e2efly.policy.contract import CONTRACT_VERSION, METADATA_KEY, Action, Contract
 from e2efly.policy.images import NONE, Image
 from e2efly.policy.onnx_file import sealed
@@ -51,7 +52,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         raise ValueError(f"family of the environment is {env.family}; its configuration says {family}")
     if env.cameras != about.cameras:
         raise ValueError(f"cameras of the environment are {env.cameras}; its configuration says {about.cameras}")
-    actor = Actor.of(env.fields, env.cameras, config.network)
+    actor = actor_of(env.fields, env.cameras, config.network)
     latency = _decimals(env.latency_range)
     limits = (tuple(map(float, low)), tuple(map(float, high)))
     courses = config.task.domain()

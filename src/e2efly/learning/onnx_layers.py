@@ -7,7 +7,9 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, Features, Gru, Layers, View, Weights
+from e2efly.learning.raptor_actor import RaptorActor
 from e2efly.policy.loader import INPUT, MEMORY, NEXT_MEMORY, OUTPUT
+from e2efly.policy.raptor.raptor_form import COLUMNS, FARTHEST, FASTEST, FIELDS, OUTPUTS, ROTOR_OF, UNITS
 from e2efly.simulation.sensors.eyes import image_shape
 
 OPERATORS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
@@ -66,6 +68,8 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
         images: the name of each camera's input.
     """
     graph, features, units = Graph(), actor.features, actor.network.recurrent
+    if isinstance(actor, RaptorActor):
+        return _raptor_graph(graph, weights)
     operator = OPERATORS[actor.network.activation]
     _of_state(graph, features)
     seen = zip(images, features.views, weights.encoders, strict=True)
@@ -79,6 +83,31 @@ def policy_graph(weights: Weights, actor: Actor, images: list[str]) -> onnx.Grap
     memory = {MEMORY: (units,)} if units else {}
     action = {OUTPUT: (len(weights.head[-1][1]),)}
     return graph.whole(inputs | memory, action | ({NEXT_MEMORY: (units,)} if units else {}))
+
+
+def _raptor_graph(graph: Graph, weights: Weights) -> onnx.GraphProto:
+    """The graph of a policy of RAPTOR's form: `RaptorFeatures`, then `RaptorActor`. Its action is clipped.
+
+    `e2efly.policy.raptor.raptor_network` reads its constants by name.
+    """
+    last = [COLUMNS["past_actions"][i] for i in ROTOR_OF]
+    for name, columns in (
+        ("error", COLUMNS["position_error"]),
+        ("velocity", COLUMNS["velocity"]),
+        ("rest", [*COLUMNS["body_rate"], *last]),
+    ):
+        graph.node("Gather", [INPUT, graph.constant(f"{name}_index", np.array(columns, np.int64))], name, axis=1)
+    graph.node("Mul", ["error", graph.constant("minus", np.float32(-1))], "offset")
+    shown = [graph.clip("offset", FARTHEST, "offset_shown"), rotation(graph, COLUMNS["attitude"][0])]
+    shown += [graph.clip("velocity", FASTEST, "velocity_shown"), "rest"]
+    graph.node("Concat", shown, "features", axis=1)
+    assert weights.cell is not None
+    graph.layers(weights.encoders[0], "features", ["Relu"], "dense", "dense_")
+    graph.layers(weights.head, _remembered(graph, weights.cell, "dense"), ["Identity"], "rotors")
+    index = graph.constant("rotor_index", np.array(ROTOR_OF, np.int64))
+    graph.clip(graph.node("Gather", ["rotors", index], "unclipped", axis=1), 1.0, OUTPUT)
+    inputs: dict[str, tuple[int, ...]] = {INPUT: (sum(FIELDS.values()),), MEMORY: (UNITS,)}
+    return graph.whole(inputs, {OUTPUT: (OUTPUTS,), NEXT_MEMORY: (UNITS,)})
 
 
 def perceptron_graph(

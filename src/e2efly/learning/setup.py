@@ -10,6 +10,7 @@ from e2efly.learning.algorithm import Algorithm, make_algorithm
 from e2efly.learning.curriculum import CurriculumStage, stages
 from e2efly.learning.devices import share
 from e2efly.learning.networks import Actor
+from e2efly.learning.raptor_actor import actor_of
 from e2efly.learning.run_budget import check_run
 from e2efly.runs import presets
 
@@ -38,7 +39,7 @@ class Setup:
         presets.check(config)
         env = Env.of(config.task, config.reward, config.env)
         course = stages(env, config.task, config.curriculum)
-        actor = Actor.of(env.fields, env.cameras, config.network)
+        actor = actor_of(env.fields, env.cameras, config.network)
         algorithm = make_algorithm(config.algo, actor)
         per_update = config.algo.steps
         chunks = -(-config.steps // (per_update * config.chunk))

@@ -14,9 +14,11 @@ from e2efly.learning.checkpoint import read_arrays
 from e2efly.learning.networks import Actor, Gru, Layers, Weights
 from e2efly.learning.onnx_export import contract_of
 from e2efly.learning.onnx_layers import OPERATORS
+from e2efly.learning.raptor_actor import RaptorActor, weights_of
 from e2efly.learning.setup import Setup
 from e2efly.policy.contract import Contract
 from e2efly.policy.loader import OUTPUT, load_policy
+from e2efly.policy.raptor.raptor_network import parameters_of
 from e2efly.runs.rundir import run_of
 
 
@@ -44,7 +46,13 @@ def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
             raise ValueError(
                 f"start_from {path}: its {name} is {value}; accepted: {accepted}, as this run's policy has{hint}"
             )
-    weights = _weights(path, loaded.content, parameters.policy, setup.actor)
+    if isinstance(setup.actor, RaptorActor):
+        try:
+            weights = weights_of(parameters_of(loaded))
+        except ValueError as error:
+            raise ValueError(f"start_from {path}: {error}") from None
+    else:
+        weights = _weights(path, loaded.content, parameters.policy, setup.actor)
     copies = {
         field.name: weights
         for field in dataclasses.fields(parameters)

@@ -22,7 +22,8 @@ class Field:
     """Number of values."""
     frame: str
     """`world` (ENU), `body` (FLU), `world_body` (a rotation from body to world) or `none`. The network turns vectors of
-    the world into the body frame, and a rotation into the world's up axis in the body frame."""
+    the world into the body frame, and a rotation into the world's up axis in the body frame, unless it is of RAPTOR's
+    form."""
     unit: str
     """Unit of each value."""
     scale: float

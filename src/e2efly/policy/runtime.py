@@ -94,6 +94,7 @@ class Runtime:
         imu: bool = False,
         images: bool = False,
         others: bool = False,
+        rotors: bool = False,
     ) -> "Runtime":
         """Check that the parts fit together.
 
@@ -106,12 +107,13 @@ class Runtime:
             imu: whether `act` will be given IMU measurements.
             images: whether `act` will be given the images that the contract asks for.
             others: whether `act` will be given the other vehicles that the policy observes.
+            rotors: whether what flies takes the commands of rotors, as a simulator does.
 
         Raises:
             ValueError: naming everything that does not fit, one item per line.
         """
         contract, envelope = policy.contract, envelope or Envelope()
-        reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images)
+        reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images, rotors=rotors)
         if (count := getattr(course.goal, "neighbours", 0)) and not others:
             reasons += (
                 f"the policy observes the {count} nearest other vehicles; accepted: with a pose source for each other "
@@ -183,13 +185,15 @@ def check(
     *,
     imu: bool = False,
     images: bool = False,
+    rotors: bool = False,
 ) -> tuple[str, ...]:
     """The reasons why a policy cannot fly here. Empty: it can. `shown` has the task's own fields of the observation.
     `control_rate` is the rate at which the policy will be called, Hz. None: the rate of its training. `imu` and
-    `images` tell whether IMU measurements and the images that the contract asks for are available.
+    `images` tell whether IMU measurements and the images that the contract asks for are available, and `rotors` whether
+    what flies takes the commands of rotors.
     """
     reasons = list(contract.refusals(vehicle, control_rate))
-    if contract.action.mode not in MODES:
+    if contract.action.mode not in MODES and not rotors:
         reasons.append(
             f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
             "which become collective thrust and body rates"

@@ -152,8 +152,9 @@ def _flying(mission: FleetMission, policy: Policy | Baseline, plant: Plant, flig
     names = [image.name for image in policy.contract.images]
     reality, sight = flight.reality, flight.sight
     runtime = Runtime.of(
-        policy, flight.course, mission.trained, imu=True, images=sight is not None, others=mission.agents > 1
-    )
+        policy, flight.course, mission.trained, imu=True, images=sight is not None, others=mission.agents > 1,
+        rotors=True,
+    )  # fmt: skip
     latency = max(reality.latency - plant.latency, 0.0)
     images = None
     if sight is not None:

@@ -28,7 +28,7 @@ class FlightController:
         mode = COMMAND_MODES[command_mode]
         self._vehicle, self._by_rates, self._controller = vehicle, command_mode == "ctbr", mode.controller
         self._low, self._high = vehicle.thrust_range
-        self._unit = self._high if mode.of_largest else 1.0
+        self._of_largest, self._full = mode.of_largest, vehicle.full_rotor_speed
         self._loop = PlainRateLoop(vehicle, plain_mixer)
 
     def start(self, body_rate: Numbers) -> None:
@@ -45,12 +45,18 @@ class FlightController:
             dt: time since the last call, s.
         """
         if self._controller is None:
-            return [min(max(self._unit * f, self._low), self._high) for f in command]
+            return [min(max(self._thrust(x), self._low), self._high) for x in command]
         if not self._by_rates:
             known = PlantMotion(Vec3(*pose[:3]), Vec3(*motion[:3]), Quat(*pose[3:]))
             wanted = self._controller(self._vehicle, known, (command[0], command[1], command[2], command[3]))
             command = [float(x) for x in (wanted.thrust, wanted.rate.x, wanted.rate.y, wanted.rate.z)]
         return self._loop.thrusts(command, motion[3:], dt)
+
+    def _thrust(self, command: float) -> float:
+        """Thrust that a rotor's command asks for, N."""
+        if self._of_largest == "speed":
+            return self._vehicle.rotor_thrust(max(command, 0.0) * self._full)
+        return command * self._high if self._of_largest == "thrust" else command
 
 
 class PlainRateLoop:

@@ -270,6 +270,6 @@ def flyable(
             "as a plant has one flight controller"
         )
     own = found.known
-    if reasons := check(contract, own, fields_of(contract), imu=True, images=True):
+    if reasons := check(contract, own, fields_of(contract), imu=True, images=True, rotors=True):
         raise ValueError("\n".join(reasons))
     return found, kind, own

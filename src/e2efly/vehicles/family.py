@@ -262,10 +262,11 @@ class Family:
         if command_mode == "ctbr":
             rates = [r.roll_rate_max[1], r.roll_rate_max[1], r.yaw_rate_max[1]]
             return [0.0, *(-x for x in rates)], [min(r.thrust_to_weight[1], _COMMANDED) * GRAVITY, *rates]
-        if command_mode == "rotor_share":
+        if command_mode in ("rotor_share", "rotor_speed"):
             return [0.0] * 4, [1.0] * 4
         raise ValueError(
-            f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr' or 'rotor_share'"
+            f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr', 'rotor_share' or "
+            "'rotor_speed'"
         )
 
 

@@ -25,6 +25,7 @@ file has."""
 OF_MODE = {
     "rotor_thrust": ("rotor_spin",),
     "rotor_share": ("rotor_spin",),
+    "rotor_speed": ("rotor_spin",),
     "ctbr": (),
     "attitude": ("attitude_gain",),
     "acceleration": ("attitude_gain", "tilt_max"),

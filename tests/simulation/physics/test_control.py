@@ -13,6 +13,8 @@ from e2efly.simulation.physics import Physics, State, rotation
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.body import rotor_thrust
 from e2efly.simulation.physics.state import split
+from e2efly.simulation.physics.step import step
+from e2efly.validation.flight_controller import FlightController
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
@@ -135,6 +137,7 @@ def test_command_limits_of_the_paper(vis_r: Vehicle) -> None:
     expected = {
         "rotor_thrust": ([vis_r.thrust_range[0]] * 4, [5.12] * 4),
         "rotor_share": ([0] * 4, [1] * 4),
+        "rotor_speed": ([0] * 4, [1] * 4),
         "ctbr": ([0, -10, -10, -4], [top, 10, 10, 4]),
         "attitude": ([0, -0.8, -0.8, -np.pi], [top, 0.8, 0.8, np.pi]),
         "acceleration": ([-8, -8, -8, -np.pi], [8, 8, 8, np.pi]),
@@ -157,3 +160,17 @@ def test_the_gains_of_the_other_vehicles_fly(name: str, fly: Callable[..., State
     path = fly(physics, vehicle, state, jnp.broadcast_to(command, (STEPS, BATCH, 4)))
     np.testing.assert_allclose(path.position[-1], command[:, :3], atol=1e-2)
     np.testing.assert_allclose(level(path)[-1, :, 0], command[:, 3], atol=1e-2)
+
+
+def test_rotors_go_to_the_share_of_the_speed_that_gives_their_largest_thrust(vis_r: Vehicle) -> None:
+    physics = Physics.of(vis_r, "rotor_speed", dtype=np.float64)
+    state = State.hovering(vis_r, jnp.zeros((1, 3)))
+    command = jnp.asarray([[0.3, 0.6, 1.4, -0.2]])
+    state = jax.jit(lambda s: jax.lax.fori_loop(0, 20, lambda _, s: step(physics, physics.nominal, s, command), s))(
+        state
+    )
+    wanted = [0.3 * vis_r.full_rotor_speed, 0.6 * vis_r.full_rotor_speed, vis_r.full_rotor_speed, vis_r.rotor_speed_min]
+    np.testing.assert_allclose(state.rotor_speed[0], wanted, rtol=1e-3)
+    controller = FlightController(vis_r, "rotor_speed")
+    thrusts = controller.thrusts(command[0].tolist(), [0.0] * 7, [0.0] * 6, 0.01)
+    np.testing.assert_allclose(thrusts, [vis_r.rotor_thrust(w) for w in wanted], rtol=1e-6)

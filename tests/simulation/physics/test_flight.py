@@ -121,6 +121,7 @@ def test_wind_is_a_moving_frame(
 COMMANDS = {
     "rotor_thrust": [1.9, 1.7, 2.0, 1.8],
     "rotor_share": [0.37, 0.33, 0.39, 0.35],
+    "rotor_speed": [0.61, 0.57, 0.62, 0.59],
     "ctbr": [11.0, 1.0, -2.0, 0.7],
     "attitude": [10.0, 0.3, -0.2, 0.5],
     "acceleration": [1.0, -2.0, 0.5, 0.6],

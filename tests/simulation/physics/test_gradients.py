@@ -31,12 +31,13 @@ SHAPES = {
 """The vehicle's parameters that move the plant."""
 KRAD = 1000.0
 HOVER = {
-    "rotor_thrust": [0.75 * 9.81 / 4] * 4, "rotor_share": [0.75 * 9.81 / 4 / 5.12] * 4, "ctbr": [9.81, 0, 0, 0],
-    "attitude": [9.81, 0, 0, 0],
+    "rotor_thrust": [0.75 * 9.81 / 4] * 4, "rotor_share": [0.75 * 9.81 / 4 / 5.12] * 4, "rotor_speed": [0.6] * 4,
+    "ctbr": [9.81, 0, 0, 0], "attitude": [9.81, 0, 0, 0],
 }  # fmt: skip
 EXTREME = {
     "rotor_thrust": [9.0, -1.0, 9.0, 8.0],
     "rotor_share": [1.8, -0.2, 1.8, 1.6],
+    "rotor_speed": [1.4, -0.2, 1.3, 1.2],
     "ctbr": [80.0, 9.0, -20.0, 3.0],
     "attitude": [70.0, 1.5, -1.5, 2.0],
     "acceleration": [50.0, -60.0, 40.0, 0.6],

@@ -160,6 +160,7 @@ def test_every_mode_and_integrator_is_tested() -> None:
 FLOWN = (
     ("rotor_thrust", "rk4"),
     ("rotor_share", "rk3"),
+    ("rotor_speed", "rk4"),
     ("ctbr", "rk4"),
     ("attitude", "rk3"),
     ("acceleration", "euler"),

@@ -24,12 +24,15 @@ Law = Callable[[Vehicle, Mixer, Parts, Command, RateLoop | None], Rotors]
 
 
 def control_law(mode: CommandMode) -> Law:
-    """The control law of a command mode: rotor thrusts within their limits, or body rates held by the rate loop."""
+    """The control law of a command mode: rotors within their limits, or body rates held by the rate loop."""
     controller = mode.controller
 
     def law(vehicle: Vehicle, mixer: Mixer, parts: Parts, command: Command, memory: RateLoop | None = None) -> Rotors:
         if controller is None:
-            if mode.of_largest:
+            if mode.of_largest == "speed":
+                low, high = rotor_speed_for(vehicle, (jnp.asarray(mixer.thrust_min), jnp.asarray(mixer.thrust_max)))
+                return tuple(jnp.clip(share * high, low, high) for share in command)
+            if mode.of_largest == "thrust":
                 command = tuple(share * mixer.thrust_max for share in command)
             return rotor_speed_for(vehicle, mixer.limit(command))
         return _rates(vehicle, mixer, parts.body_rate, controller(vehicle, parts, _four(command)), memory)

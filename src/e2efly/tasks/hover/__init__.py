@@ -37,7 +37,7 @@ class HoverConfig(TaskConfig):
     goal_class: ClassVar[str] = "e2efly.tasks.hover.goal:HoverGoal"
     route: ClassVar[str] = "e2efly.tasks.hover.goal:HoverRoute"
     shows_error: ClassVar = True
-    variants: ClassVar = ("thrown", "rotors", "lost_rotor")
+    variants: ClassVar = ("thrown", "rotors", "raptor", "lost_rotor")
     smooth: ClassVar = {"near": 1.0, "prog2": 0.2, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0}
     best: ClassVar = "bptt"
     robust: ClassVar = {
@@ -61,6 +61,14 @@ class HoverConfig(TaskConfig):
         algo={"horizon": 160, "learning_rate": 6e-3, "average": 0.99},
         steps=30_000_000,
         chunk=150,
+    )
+    raptor: ClassVar = Robust(
+        weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05, "ori1": 0.2},
+        algo={"horizon": 240, "learning_rate": 6e-3, "average": 0.99, "gamma": 0.995, "gradient_decay": 1.5},
+        steps=60_000_000,
+        chunk=150,
+        recurrent=16,
+        hidden=(16,),
     )
     lost_rotor: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 1.0, "v1": 0.1, "upright": 0.1, "anglevxy_sq": 0.02, "act2_sq": 0.05},
@@ -92,6 +100,8 @@ class HoverConfig(TaskConfig):
     """Largest start velocity, m/s per axis, in either direction; drawn uniformly."""
     tilt: float = number(0.5235987755982988, high=ANGLE)
     """Largest start roll and pitch, rad, in either direction; drawn uniformly."""
+    heading: float = number(math.pi, high=ANGLE, added=True)
+    """Largest start yaw, rad, in either direction; drawn uniformly."""
     body_rate: float = number(1.0, high=BODY_RATE)
     """Largest start body rates, rad/s per axis, in either direction; drawn uniformly."""
     radius: float = number(0.1, above=0)
@@ -151,13 +161,20 @@ class HoverConfig(TaskConfig):
 
         `rotors`: hover by rotor thrusts at 100 Hz, with a memory, and with delays of up to 34 ms.
 
+        `raptor`: the same by rotor speeds, with exactly RAPTOR's network, which turns to the world's x axis.
+
         `lost_rotor`: a hexacopter stays at its place, although one of its rotors stops in nine of ten episodes. Its
         heading is free.
         """
-        if preset in ("rotors", "lost_rotor"):
+        if preset in ("rotors", "raptor", "lost_rotor"):
             if not isinstance(config.algo, BPTTConfig):
                 raise ValueError(f"preset {preset!r}: accepted for hover by bptt; not by {config.algo.name}")
             by_rotors = EnvConfig(command_mode="rotor_share", control_rate=100.0, action_latency=(0.0, 0.034))
+            if preset == "raptor":
+                env = dataclasses.replace(by_rotors, vehicle="any", command_mode="rotor_speed", past_actions=1)
+                network = dataclasses.replace(config.network, form="raptor")
+                config = dataclasses.replace(config, task=cls(heading=0.8), network=network)
+                return cls.raptor.into(dataclasses.replace(config, env=env))
             loses = EnvConfig(vehicle="hexa", lost_rotor=0.9)
             recipe, env = (cls.rotors, by_rotors) if preset == "rotors" else (cls.lost_rotor, loses)
             return recipe.into(dataclasses.replace(config, env=env))

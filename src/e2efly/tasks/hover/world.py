@@ -20,10 +20,10 @@ class Hover(HoverGoal):
     """Starts around the target, over level ground."""
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, Float[Array, " n"]]:
-        """Uniform around the target: position, velocity, roll, pitch, any yaw, body rates."""
+        """Uniform around the target: position, velocity, roll, pitch, yaw, body rates."""
         c, u = self.config, uniform(key, n, 12)
         state = at_rest(jnp.asarray(c.target) + c.position * u[:, :3])
-        quaternion = from_euler(c.tilt * u[:, 6], c.tilt * u[:, 7], jnp.pi * u[:, 8])
+        quaternion = from_euler(c.tilt * u[:, 6], c.tilt * u[:, 7], c.heading * u[:, 8])
         return dataclasses.replace(
             state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion, body_rate=c.body_rate * u[:, 9:12]
         ), jnp.zeros(n)
