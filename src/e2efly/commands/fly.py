@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly a quadrotor with Betaflight, PX4 or ArduCopter. The pilot's switches decide. See docs/flying.md first."""
+    """Fly a quadrotor with Betaflight, PX4 or ArduCopter, or a Crazyflie. The pilot decides. See docs/flying.md first."""
 
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
     """A policy.onnx, a run directory, or a task (the zoo's policy). In place of a policy, `excitation` flies the
@@ -65,8 +65,9 @@ class Fly:
     `e2efly fly POLICY --help-all` also lists the options of the policy's goal."""
     link: str = "/dev/ttyACM0"
     """Connection to the flight controller: /dev/ttyACM0, serial:/dev/ttyS1?baud=921600 or tcp:HOST:PORT (Betaflight).
-    mavlink:udp:HOST:PORT, mavlink:udpout:HOST:PORT or mavlink:/dev/ttyACM0: PX4 or ArduCopter. Or your
-    own autopilot, path/to/file.py:Name[:...]. See docs/mavlink.md."""
+    mavlink:udp:HOST:PORT, mavlink:udpout:HOST:PORT or mavlink:/dev/ttyACM0: PX4 or ArduCopter (docs/mavlink.md).
+    radio://0/80/2M/E7E7E7E7E7 or crazyflie:udp:HOST:PORT: a Crazyflie (docs/crazyflie.md). Or your own autopilot,
+    path/to/file.py:Name[:...]."""
     pose: str = "udp:9870"
     """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
     path/to/file.py:Name[:...]."""
