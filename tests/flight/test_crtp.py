@@ -1,6 +1,7 @@
 """CRTP: packets, links and words."""
 
 import os
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 from e2efly.flight.autopilots import check_link
 from e2efly.flight.crazyflie.contents import entry
 from e2efly.flight.crazyflie.crtp import LOGS, PARAMETERS, CrtpPacket, PacketReader, arming, external_pose, setpoint
-from e2efly.flight.crazyflie.crtp_link import RadioPort
+from e2efly.flight.crazyflie.crtp_link import RadioPort, open_crtp
 from e2efly.flight.crazyflie.words import TypedWish, Words
 from e2efly.flight.pilot.flight_state import Mission
 
@@ -121,6 +122,12 @@ def test_a_radio_tells_when_nobody_answers_and_when_it_is_pulled_out() -> None:
     with pytest.raises(ConnectionError, match="Crazyradio: no such device"):
         pulled.read()
     pulled.close()
+
+
+def test_a_missing_package_is_named_with_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "usb.core", None)
+    with pytest.raises(ValueError, match=r"accepted: pip install 'e2efly\[crazyflie\]'"):
+        open_crtp("radio://0/80/2M").poll(0.0)
 
 
 def test_the_pilot_types_words_and_any_other_line_lands() -> None:

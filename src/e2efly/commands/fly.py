@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly a quadrotor with Betaflight, PX4 or ArduCopter, or a Crazyflie. The pilot decides. See docs/flying.md first."""
+    """Fly a quadrotor with Betaflight, PX4 or ArduCopter, or a Crazyflie. The pilot decides: see docs/flying.md."""
 
     policy: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[POLICY]")]] = None
     """A policy.onnx, a run directory, or a task (the zoo's policy). In place of a policy, `excitation` flies the

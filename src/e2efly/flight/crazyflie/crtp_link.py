@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 from e2efly.flight.crazyflie.crtp import whole
@@ -66,12 +67,12 @@ def crazyradio(number: int) -> Any:
         OSError: there is no such radio, or it may not be used.
     """
     try:
-        import usb.core  # only where a radio is used
+        core = import_module("usb.core")  # only where a radio is used
     except ImportError as error:
         raise ValueError(f"a Crazyradio needs PyUSB ({error}); accepted: pip install 'e2efly[crazyflie]'") from None
     try:
-        radios = list(usb.core.find(find_all=True, idVendor=VENDOR, idProduct=PRODUCT) or ())
-    except usb.core.NoBackendError as error:
+        radios = list(core.find(find_all=True, idVendor=VENDOR, idProduct=PRODUCT) or ())
+    except core.NoBackendError as error:
         raise OSError(f"PyUSB finds no libusb ({error}); install libusb-1.0") from None
     if number >= len(radios):
         raise OSError(f"no Crazyradio {number}: the system has {len(radios)}")
@@ -138,9 +139,7 @@ class RadioPort:
         if self._thread is not threading.current_thread():
             self._thread.join(2 * USB_MS / 1000)
         with suppress(ImportError):
-            import usb.util
-
-            usb.util.dispose_resources(self._device)
+            import_module("usb.util").dispose_resources(self._device)
 
     def _run(self) -> None:
         kept: bytes | None = None  # not acknowledged yet: it is sent once more
