@@ -1,5 +1,6 @@
 """Tables of contents: which parameters and log variables a Crazyflie has, by name, with their numbers and types."""
 
+import math
 import struct
 from dataclasses import dataclass
 
@@ -25,7 +26,7 @@ class TableEntry:
     kind: int
     """The number of its type."""
     format: str
-    """Its type as a format of `struct`, little endian."""
+    """Its type as a format of `struct`, little endian. Empty: a type that is not known."""
 
     @property
     def size(self) -> int:
@@ -33,18 +34,15 @@ class TableEntry:
         return struct.calcsize("<" + self.format)
 
     def value(self, data: bytes) -> float:
-        """The value of the first bytes."""
-        return float(struct.unpack_from("<" + self.format, data)[0])
+        """The value of the first bytes. NaN for a type that is not known."""
+        return float(struct.unpack_from("<" + self.format, data)[0]) if self.format else math.nan
 
 
 def entry(port: int, data: bytes) -> TableEntry | None:
-    """The entry in an answer of ITEM: number, type, group and name. None: it is of no known form."""
+    """The entry in an answer of ITEM: number, type, group and name. None: it is none."""
     if len(data) < 6 or data[0] != ITEM:
         return None
     kind = data[3] & 0x0F
     group, variable, *_ = (*data[4:].split(b"\0"), b"")
-    kinds = FORMATS[port]
-    if kind not in kinds:
-        return None
     name = b".".join((group, variable)).decode("ascii", "replace")
-    return TableEntry(name, int.from_bytes(data[1:3], "little"), kind, kinds[kind])
+    return TableEntry(name, int.from_bytes(data[1:3], "little"), kind, FORMATS[port].get(kind, ""))
