@@ -1,6 +1,6 @@
 """Whole flights and faults of a Crazyflie: its firmware as it documents itself, over our rigid body.
 
-    python benchmarks/crazyflie.py [--flights 20] [--faults 5] [--json FILE]
+    python benchmarks/crazyflie.py [--flights 10] [--faults 2] [--json FILE]
 
 The firmware is `tests/flight/crazyflie_peer.py`: packets, supervisor, time-outs, a rate loop and a mixer without
 airmode of their own, in virtual time. No firmware flies here. Each of the zoo's Crazyflie policies flies whole flights:
@@ -67,7 +67,7 @@ def faults(count: int) -> Iterator[dict[str, Any]]:
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", flights=20, faults=5)
+    args = arguments(__doc__ or "", flights=10, faults=2)
     compute_at_once()
     prepare("cpu")
     found = {"flights": list(flights(args.flights)), "faults": list(faults(args.faults))}
