@@ -62,6 +62,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "mavlink": "Whole flights over MAVLink, PX4 and ArduCopter as they document themselves",
+    "crazyflie": "Whole flights over CRTP, a Crazyflie as its firmware's sources say",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_vehicles": "Every vehicle's policies through real Betaflight firmware",
     "room_flights": "The paper's six tasks through real Betaflight firmware, in a room of 6x6 m",
@@ -98,7 +99,8 @@ POLICIES = {
         (
             "many_vehicles", "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify",
             "step_response",
-            "identify_structure", "identify_structure_plain", "mavlink", "step_alignment", "pad_masks", "identify_betaflight", "runtime_speed", "msp_fuzz",
+            "identify_structure", "identify_structure_plain", "mavlink", "crazyflie", "step_alignment", "pad_masks",
+            "identify_betaflight", "runtime_speed", "msp_fuzz",
             "log_fuzz",
         ),
         NONE,
