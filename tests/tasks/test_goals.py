@@ -150,7 +150,7 @@ def test_every_task_says_what_flight_needs_without_jax() -> None:
 def test_the_contract_chooses_the_goal(contracts: dict[str, Contract]) -> None:
     for name, policy in contracts.items():
         goal = course(policy).goal
-        assert type(goal) is goal_of(TASKS[name])
+        assert issubclass(goal_of(TASKS[name]), type(goal))  # a vehicle of avoid_together flies a lane of its own
         assert [field.name for field in goal.fields] == [field.name for field in policy.observation][: len(goal.fields)]
 
 

@@ -137,8 +137,8 @@ def test_a_plant_that_does_not_fly_a_policy_is_told_on_the_card(small: None, tmp
     from e2efly.environment import Env
 
     file = made(tmp_path / "x.onnx", 0.01, Env.of(config.task, config.reward, config.env), config)
-    part = scorecard._flown(entrant(file), "mujoco", "trained", 1)
-    assert "action.mode of the policy is 'rotor_share'; accepted: 'ctbr'" in part["refused"]
+    part = scorecard._flown(entrant(file), "betaflight", "trained", 1)
+    assert "plant 'betaflight' takes no 'rotor_share' commands" in part["refused"]
 
 
 @pytest.mark.parametrize(

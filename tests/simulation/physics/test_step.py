@@ -148,4 +148,4 @@ def test_wrong_options(vis_r: Vehicle) -> None:
 def test_registries_have_the_papers_entries() -> None:
     assert set(INTEGRATORS) == {"euler", "semi_implicit", "rk3", "rk4"}
     assert list(COMMAND_MODES) == [mode.name for mode in COMMAND_MODES.values()]
-    assert len(COMMAND_MODES) == 7
+    assert len(COMMAND_MODES) == 8
