@@ -60,7 +60,11 @@ def open_autopilot(
     if (own := referenced(target)) is not None:
         made = load(own[0])(own[1], settings)
         check_methods(made, METHODS)
-        made.identify(CONNECT_S)
+        try:
+            made.identify(CONNECT_S)
+        except BaseException:
+            made.close()
+            raise
         return made, None
     held: Link = WatchedLink(target) if watched else open_link(target)
     try:
