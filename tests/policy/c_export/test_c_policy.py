@@ -65,7 +65,7 @@ def test_a_policy_of_a_family_says_its_ranges(tmp_path: Path) -> None:
         (["race", "--name", "Race"], "--name is 'Race'; accepted: a name of C"),
         (["race", "--out", "x.onnx"], "--out is 'x.onnx', which has no effect with --c"),
         (["race", "--web", "x"], "--web is 'x', which has no effect with --c"),
-        (["race", "--vehicle", "vis_h"], "--vehicle is 'vis_h', which has no effect with --c"),
+        (["race", "--vehicle", "vis_h"], "--vehicle is 'vis_h'; accepted: with --web or --crazyflie"),
         (["hoover"], "unknown policy 'hoover'"),
     ],
 )  # fmt: skip
