@@ -53,7 +53,8 @@ of `eval`, from which no training draws. Do not tune on them: for that, there is
 goes on where an interrupted one was, and flies again only what has another scale, policy, vehicle or version of e2efly.
 
 ## A policy of Stable-Baselines3
-Its own file cannot be read without running the code in it. Export the model by `e2efly.export(model, "policy.onnx")`, then score that file. `export` writes the contract from the environment of the model ([other frameworks](adapters.md)).
+Its own file cannot be read without running the code in it. Export the model by `e2efly.export(model, "policy.onnx")`,
+then score that file. `export` writes the contract from the environment of the model ([other frameworks](adapters.md)).
 
 ## A policy of another program
 Put a contract beside its ONNX file: `theirs.contract.json` beside `theirs.onnx`.
