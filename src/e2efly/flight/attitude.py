@@ -17,6 +17,15 @@ class Attitude:
     is 0."""
 
 
+def attitude_of(w: float, x: float, y: float, z: float) -> Attitude:
+    """The attitude of a unit quaternion, from body FLU to a frame whose z axis points up."""
+    return Attitude(
+        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
+        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    )
+
+
 def turned(attitude: Attitude, rate: tuple[float, float, float], dt: float) -> Attitude:
     """The attitude after `dt` s of a body rate, FLU, rad/s: by the kinematics of Euler angles."""
     p, q, r = rate

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from e2efly.flight.attitude import Attitude
+from e2efly.flight.attitude import Attitude, attitude_of
 from e2efly.flight.autopilot import HOLE, AutopilotState, InertialReading, Outgoing
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.crazyflie.crazyflie_needs import BEHAVIOUR, NEEDS, PROTOCOL, firmware_row
@@ -182,12 +182,7 @@ class Crazyflie:
         found = self.station.newest(MOTION, now, oldest)
         if found is None:
             return None
-        w, x, y, z = (found[0][name] for name in MOTION.names[:4])
-        return Attitude(
-            math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-            math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
-            math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-        ), found[1] - self._late
+        return attitude_of(*(found[0][name] for name in MOTION.names[:4])), found[1] - self.station.echoes.late
 
     def rotor_speeds(self, now: float, oldest: float) -> Sequence[float] | None:
         """None: a Crazyflie measures none that it tells here."""
@@ -217,7 +212,7 @@ class Crazyflie:
 
     def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
         """Whether it has echoed time stamps that were sent together with these commands."""
-        return self.station.delivered(start, end, hole)
+        return self.station.echoes.delivered(start, end, hole)
 
     def uncertain(self, now: float) -> bool:
         """Never: an echo names the moment at which it was sent."""
@@ -227,23 +222,11 @@ class Crazyflie:
     def link_record(self) -> dict[str, Any]:
         """Counts of time stamps and echoes, and how long the newest took."""
         station = self.station
-        return {
-            "requests": station.requests,
-            "replies": station.replies,
-            "timeouts": station.requests - station.replies,
-            "errors": station.malformed,
-            "reconnects": max(station.link.connections - 1, 0),
-            "round_trip": station.round_trip or None,
-        }
+        return station.echoes.record(station.malformed, station.link.connections)
 
     def close(self) -> None:
         """Close the link."""
         self.station.link.close()
-
-    @property
-    def _late(self) -> float:
-        """From sending a command to the arrival of a measurement that shows it, s."""
-        return 0.0 if math.isinf(self.station.quickest) else self.station.quickest
 
     @property
     def _wanted(self) -> bool:
@@ -282,8 +265,8 @@ class Crazyflie:
             return f"no packet within {self.settings.link_timeout:g} s"
         if not told:
             return "its supervisor tells nothing"
-        if self.station.round_trip > SLOW_S:
-            return f"it answers {1e3 * self.station.round_trip:.0f} ms late"
+        if self.station.echoes.round_trip > SLOW_S:
+            return f"it answers {1e3 * self.station.echoes.round_trip:.0f} ms late"
         return None
 
     def _inertial(self) -> InertialReading | None:
@@ -294,7 +277,7 @@ class Crazyflie:
         told, self._felt = found
         x, y, z = (MILLI_G * told[f"acc.{axis}"] for axis in "xyz")
         p, q, r = (math.radians(told[f"gyro.{axis}"]) for axis in "xyz")
-        return InertialReading((x, y, z), (p, q, r), found[1] - self._late, found[1])
+        return InertialReading((x, y, z), (p, q, r), found[1] - self.station.echoes.late, found[1])
 
     def _records(self, now: float) -> tuple[tuple[str, float, dict[str, Any]], ...]:
         """What came since the last call, for the log."""

@@ -2,19 +2,16 @@
 
 import math
 import struct
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from e2efly.flight.autopilot import HOLE, arrived
 from e2efly.flight.clock import Clock
 from e2efly.flight.crazyflie.contents import INFO, ITEM, TableEntry, entry
 from e2efly.flight.crazyflie.crtp import LINK_SERVICE, LOGS, PARAMETERS, PLATFORM, CrtpPacket, PacketReader
+from e2efly.flight.echoes import Echoes
 from e2efly.flight.link import Link
 
-ECHO_S = 0.02
-"""Interval of the time stamps that the Crazyflie sends back, s."""
 AGAIN_S = 0.1
 """What was asked for and did not come is asked for again after this time, s."""
 AT_ONCE = 8
@@ -50,10 +47,8 @@ class CrtpStation:
     """When the newest packet came, s."""
     counts: dict[int, int] = field(default_factory=dict)
     """How often each log block has come."""
-    quickest: float = math.inf
-    """How long the quickest echo on this connection took, s."""
-    requests: int = 0
-    replies: int = 0
+    echoes: Echoes = field(default_factory=Echoes)
+    """The time stamps that come back."""
     malformed: int = 0
     """Number of packets so far that could not be read."""
     reader: PacketReader = field(default_factory=PacketReader)
@@ -64,28 +59,22 @@ class CrtpStation:
     _blocks: dict[int, tuple[TableEntry, ...]] = field(default_factory=dict)
     _answers: dict[bytes, int] = field(default_factory=dict)
     _info: dict[int, bytes] = field(default_factory=dict)
-    _echoed: deque[float] = field(default_factory=lambda: deque(maxlen=512))
-    _trips: deque[float] = field(default_factory=lambda: deque(maxlen=5))
     _connection: int = 0
-    _asked: float = -math.inf
 
     def poll(self, now: float) -> None:
         """Read what has come, and send what is due. `now` is in s."""
         self.link.poll(now)
         if self.link.connections != self._connection:
-            self._connection, self.quickest, self.reader = self.link.connections, math.inf, PacketReader()
+            self._connection, self.reader = self.link.connections, PacketReader()
             self.latest.clear()
-            self._echoed.clear()
-            self._trips.clear()
+            self.echoes.forget()
         for packet in self.reader.feed(self.link.receive()):
             self.heard = now
             try:
                 self._take(packet, now)
             except (struct.error, IndexError):
                 self.malformed += 1
-        if self.link.alive and now - self._asked >= ECHO_S:
-            self._asked = now
-            self.requests += 1
+        if self.link.alive and self.echoes.due(now):
             self.send(CrtpPacket(LINK_SERVICE, 0, struct.pack("<d", now)))
 
     def send(self, packet: CrtpPacket) -> bool:
@@ -93,19 +82,10 @@ class CrtpStation:
         self.link.send(packet.framed())
         return self.link.alive
 
-    @property
-    def round_trip(self) -> float:
-        """How long the quickest of the newest echoes took, s."""
-        return min(self._trips, default=0.0)
-
     def newest(self, block: LogBlock, now: float, oldest: float) -> tuple[dict[str, float], float] | None:
         """The newest values of a log block, and when they came, s. None: that is more than `oldest` s ago."""
         found = self.latest.get(block.id)
         return found if found is not None and now - found[1] <= oldest else None
-
-    def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
-        """Whether what was sent from `start` to `end`, s, has arrived."""
-        return arrived(self._echoed, start, end, hole)
 
     # -- on the ground -------------------------------------------------------------------------------------------------
 
@@ -214,10 +194,6 @@ class CrtpStation:
                 self._versions[data[0]] = data[1:]
             case (port, 0) if port == LINK_SERVICE:
                 (sent,) = struct.unpack_from("<d", data)
-                if 0 <= now - sent < 1.0:
-                    self.replies += 1
-                    self._trips.append(now - sent)
-                    self.quickest = min(self.quickest, now - sent)
-                    self._echoed.append(sent)
+                self.echoes.hear(sent, now)
             case _:
                 pass

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from e2efly.control import Quat, Vec3
-from e2efly.flight.attitude import Attitude
+from e2efly.flight.attitude import Attitude, attitude_of
 from e2efly.flight.autopilot import HOLE, AutopilotState, InertialReading, Outgoing
 from e2efly.flight.clock import MONOTONIC, Clock
 from e2efly.flight.link import Link
@@ -64,7 +64,7 @@ class Mavlink:
         """Known once it is identified."""
         self.version = 0, 0, 0
         self.parameters: dict[str, float] = {}
-        self._clock, self._now, self._posed = clock, 0.0, -math.inf
+        self._clock, self._posed = clock, -math.inf
         self._logged: dict[str, float] = {}
         self._felt = -math.inf
         self._voltage: float | None = None
@@ -155,7 +155,6 @@ class Mavlink:
 
     def poll(self, now: float) -> None:
         """Read what has come, and send heartbeats and time stamps."""
-        self._now = now
         self.station.poll(now)
 
     def read(self, now: float, *, land: bool, sends: bool, grounded: bool) -> AutopilotState:
@@ -186,12 +185,7 @@ class Mavlink:
         if found is None:
             return None
         q, at = found
-        w, x, y, z = q["q1"], q["q2"], -q["q3"], -q["q4"]
-        return Attitude(
-            math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-            math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
-            math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-        ), at - self._late
+        return attitude_of(q["q1"], q["q2"], -q["q3"], -q["q4"]), at - self.station.echoes.late
 
     def rotor_speeds(self, now: float, oldest: float) -> Sequence[float] | None:
         """The newest speeds of the rotors, rad/s."""
@@ -233,7 +227,7 @@ class Mavlink:
 
     def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
         """Whether the autopilot has echoed time stamps that were sent together with these commands."""
-        return self.station.delivered(start, end, hole)
+        return self.station.echoes.delivered(start, end, hole)
 
     def uncertain(self, now: float) -> bool:
         """Never: an echo names the moment at which it was sent."""
@@ -243,23 +237,11 @@ class Mavlink:
     def link_record(self) -> dict[str, Any]:
         """Counts of time stamps and echoes, and how long the newest took."""
         station = self.station
-        return {
-            "requests": station.requests,
-            "replies": station.replies,
-            "timeouts": station.requests - station.replies,
-            "errors": station.reader.bad_checksums + station.reader.skipped,
-            "reconnects": max(station.link.connections - 1, 0),
-            "round_trip": station.round_trip or None,
-        }
+        return station.echoes.record(station.reader.bad_checksums + station.reader.skipped, station.link.connections)
 
     def close(self) -> None:
         """Close the link."""
         self.station.link.close()
-
-    @property
-    def _late(self) -> float:
-        """From sending a command to the arrival of a measurement that shows it, s."""
-        return 0.0 if math.isinf(self.station.quickest) else self.station.quickest
 
     def _wait(self, timeout: float, done: Any, ask: Any) -> bool:
         """Poll until something holds, and ask again and again. Returns whether it holds."""
@@ -296,8 +278,8 @@ class Mavlink:
             return self.station.link.reason
         if silence > self.settings.link_timeout or not beats:
             return f"no message within {self.settings.link_timeout:g} s" if beats else "no heartbeat"
-        if self.station.round_trip > SLOW_S:
-            return f"it answers {1e3 * self.station.round_trip:.0f} ms late"
+        if self.station.echoes.round_trip > SLOW_S:
+            return f"it answers {1e3 * self.station.echoes.round_trip:.0f} ms late"
         return None
 
     def _pilot(self, now: float, status: dict[str, Any] | None, *, land: bool) -> Pilot | None:
@@ -342,7 +324,7 @@ class Mavlink:
                 told, self._felt = found
                 x, y, z = (force * told[f"{axis}acc"] for axis in "xyz")
                 p, q, r = (turned[0][f"{axis}speed"] for axis in ("roll", "pitch", "yaw"))
-                return InertialReading((x, -y, -z), (p, -q, -r), found[1] - self._late, found[1])
+                return InertialReading((x, -y, -z), (p, -q, -r), found[1] - self.station.echoes.late, found[1])
         return None
 
     def _records(self, now: float) -> tuple[tuple[str, float, dict[str, Any]], ...]:

@@ -1,19 +1,18 @@
 """This program's end of a MAVLink link: what has come from the autopilot, and what is sent to it."""
 
 import math
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from e2efly.flight.autopilot import HOLE, arrived
+from e2efly.flight.echoes import Echoes
 from e2efly.flight.link import MOST, Link
 from e2efly.flight.mavlink.wire import FrameReader, MavlinkMessage, encode
 
 COMPONENT = 191
 """MAV_COMP_ID_ONBOARD_COMPUTER."""
-HEARTBEAT_S, ECHO_S = 0.5, 0.02
-"""Intervals of this program's heartbeats, and of the time stamps that the autopilot sends back, s."""
+HEARTBEAT_S = 0.5
+"""Interval of this program's heartbeats, s."""
 ONBOARD, INVALID, ACTIVE = 18, 8, 4
 """MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE."""
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512
@@ -41,36 +40,28 @@ class Station:
     """When the newest message came, s."""
     statuses: int = 0
     """Number of the autopilot's heartbeats so far."""
-    quickest: float = math.inf
-    """How long the quickest echo on this connection took, s."""
+    echoes: Echoes = field(default_factory=Echoes)
+    """The time stamps that come back."""
     said: list[str] = field(default_factory=list)
     """Texts of the autopilot since they were taken."""
-    requests: int = 0
-    replies: int = 0
     reader: FrameReader = field(default_factory=FrameReader)
-    _echoed: deque[float] = field(default_factory=lambda: deque(maxlen=512))
-    _trips: deque[float] = field(default_factory=lambda: deque(maxlen=5))
     _sequence: int = 0
     _connection: int = 0
     _beat: float = -math.inf
-    _asked: float = -math.inf
 
     def poll(self, now: float) -> None:
         """Read what has come, and send what is due. `now` is in s."""
         self.link.poll(now)
         if self.link.connections != self._connection:
-            self._connection, self.quickest = self.link.connections, math.inf
+            self._connection = self.link.connections
             self.latest.clear()
-            self._echoed.clear()
-            self._trips.clear()
+            self.echoes.forget()
         for message in self.reader.feed(self.link.receive()[-MOST:]):
             self._take(message, now)
         if now - self._beat >= HEARTBEAT_S:
             self._beat = now
             self.send("HEARTBEAT", {"type": ONBOARD, "autopilot": INVALID, "system_status": ACTIVE})
-        if self.target and now - self._asked >= ECHO_S:
-            self._asked = now
-            self.requests += 1
+        if self.target and self.echoes.due(now):
             self.send("TIMESYNC", {"tc1": 0, "ts1": round(now * 1e9)})
 
     def send(self, name: str, values: Mapping[str, Any]) -> bool:
@@ -86,23 +77,10 @@ class Station:
         """Send a command with its parameters."""
         self.send("COMMAND_LONG", {"command": number, "params": (*params, *(0.0,) * (7 - len(params)))})
 
-    @property
-    def round_trip(self) -> float:
-        """How long the quickest of the newest echoes took, s. One that is read late, because this program was held
-        up, says nothing of the link.
-        """
-        return min(self._trips, default=0.0)
-
     def newest(self, name: str, now: float, oldest: float) -> tuple[dict[str, Any], float] | None:
         """The newest message of a kind, and when it came, s. None: that is more than `oldest` s ago."""
         found = self.latest.get(name)
         return found if found is not None and now - found[1] <= oldest else None
-
-    def delivered(self, start: float, end: float, hole: float = HOLE) -> bool:
-        """Whether what was sent from `start` to `end`, s, has arrived: echoes of then have come back, `hole` s at most
-        apart.
-        """
-        return arrived(self._echoed, start, end, hole)
 
     def _take(self, message: MavlinkMessage, now: float) -> None:
         told = message.fields
@@ -117,12 +95,7 @@ class Station:
         if message.name == "HEARTBEAT":
             self.statuses += 1
         elif message.name == "TIMESYNC" and told["tc1"] > 0:
-            sent = told["ts1"] / 1e9
-            if 0 <= now - sent < 1.0:
-                self.replies += 1
-                self._trips.append(now - sent)
-                self.quickest = min(self.quickest, now - sent)
-                self._echoed.append(sent)
+            self.echoes.hear(told["ts1"] / 1e9, now)
         elif message.name == "PARAM_VALUE":
             self.parameters[_text(told["param_id"])] = told["param_value"], told["param_type"]
         elif message.name == "STATUSTEXT":
