@@ -10,7 +10,7 @@ import pytest
 from e2efly.commands.cli import run
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import trace
-from e2efly.policy.others import FAR
+from e2efly.policy.others import FAR, Company
 from e2efly.validation.duels import duel
 from e2efly.validation.evaluation import SEED, act_of
 from e2efly.validation.plant import RigidState
@@ -39,6 +39,8 @@ def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[...,
     found = validate(policy_of("swap"), "simulator", 3, task={"agents": 4, "side": 4.0, "episode_s": 3.0})
     compared, (suite,) = found.criteria["swap"], found.candidate.task.criteria().values()
     assert len(compared.flights) == 4  # a whole world
+    needs = found.candidate.policy.contract.others
+    assert needs == Company(2, ("others", "others_velocity"), 0.1, 7.141, 5.0)  # of its training, with a side of 5 m
     env = found.candidate.at_home.environment(suite)
     n = env.whole(250)
     states, _, _, out = trace(env, act_of(found.candidate.policy), random_key(SEED, UNSEEN, 0), n, 60)
