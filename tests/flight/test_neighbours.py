@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from e2efly.flight.pose.neighbours import FASTEST, LEAST, LOST_S, Neighbours
+from e2efly.flight.pose.neighbours import AGILE, LEAST, LOST_S, Neighbours
 from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.policy.goal import Shape
 from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Odometry, Sample
-from e2efly.policy.others import FAR
+from e2efly.policy.others import FAR, USUAL, Company, company_of
 from e2efly.policy.runtime import Runtime
 from e2efly.policy.zoo import policy_file
 from e2efly.tasks.swap.goal import SwapRoute
@@ -36,11 +36,11 @@ def here(now: float, place: Any = (0.0, 0.0, 1.0)) -> Odometry:
     return Odometry(now, np.array(place, float), np.zeros(3), LEVEL, np.zeros(3))
 
 
-def seen(*sources: PlantSource, until: float = 1.0) -> Neighbours:
-    """Others that were read at 100 Hz."""
-    found = Neighbours(sources, 0.1)
-    for i in range(1, round(100 * until) + 1):
-        found.read(i / 100)
+def seen(*sources: PlantSource, until: float = 1.0, needs: Company = USUAL, rate: float = 100.0) -> Neighbours:
+    """Others that were read at a rate, Hz."""
+    found = Neighbours(sources, 0.1, needs)
+    for i in range(1, round(rate * until) + 1):
+        found.read(i / rate)
     return found
 
 
@@ -67,8 +67,44 @@ def lost_distance(age: float) -> float:
 
 def test_one_that_is_lost_comes_nearer_and_never_vanishes() -> None:
     assert lost_distance(0.05) == pytest.approx(4.0, abs=0.01)
-    assert lost_distance(0.3) == pytest.approx(4.0 - FASTEST * 0.2, abs=0.02)
+    assert lost_distance(0.3) == pytest.approx(4.0 - USUAL.speed_m_s * 0.2 - AGILE / 2 * 0.1**2, abs=0.02)
     assert lost_distance(20.0) == pytest.approx(LEAST, abs=1e-6)
+
+
+def test_the_ball_of_a_lost_one_contains_it_wherever_it_flies() -> None:
+    """A racer at 11 m/s, which then turns at any acceleration and speed that it can have."""
+    random, racing = np.random.default_rng(0), company_of(1, 30.0, 20.0)
+    for _ in range(100):
+        found = seen(flying((0, 0, 1), (11.0, 0, 0), until=0.5), until=0.5, needs=racing)
+        way = random.standard_normal(3)
+        push, place, speed = AGILE * way / np.linalg.norm(way), np.array([5.5, 0, 1]), np.array([11.0, 0, 0])
+        for i in range(90):
+            speed = speed + 0.01 * push
+            speed *= min(1.0, 20.0 / float(np.linalg.norm(speed)))
+            place = place + 0.01 * speed
+            (ball,) = found.balls(0.51 + 0.01 * i)
+            away = float(np.linalg.norm(place - ball.position))
+            assert i < 10 or away <= ball.ball + 0.03
+
+
+def test_one_that_is_lost_far_away_is_no_problem() -> None:
+    found = seen(flying((30, 0, 1), until=0.5), until=0.5, needs=company_of(1, 7.0, 5.0))
+    assert "not seen" in str(found.problem(2.0))
+    assert found.problem(2.0, np.array([0, 0, 1.0])) is None  # its ball is 7.6 m wide
+    assert "not seen for 5.0 s" in str(found.problem(5.5, np.array([0, 0, 1.0])))
+
+
+def test_a_source_that_is_too_slow_or_too_short_of_sight_is_told_by_name() -> None:
+    needs = company_of(1, 7.1, 5.0)
+    slow = seen(flying((3, 0, 1)), needs=needs, until=3.0, rate=4.0)
+    told = r"another vehicle, by other, is seen every 0.25 s; accepted: seen up to 7.1 m, at most 0.1 s old"
+    assert told in str(slow.problem(3.0, begins=True)) and slow.problem(3.0) is None
+    assert seen(flying((3, 0, 1)), needs=needs, until=3.0).problem(3.0, begins=True) is None
+    near = flying((3, 0, 1))
+    near.range_m = 3.0  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match=r"by other, is seen up to range_m 3 m; accepted: 7.1 m or more, as the pol"):
+        seen(near, needs=needs)
+    assert seen(near).problem(1.0) is None
 
 
 @pytest.mark.parametrize(
@@ -89,5 +125,7 @@ def test_a_policy_flies_only_among_those_that_are_seen(
 
 def test_a_policy_that_observes_others_needs_their_poses() -> None:
     policy, course = load_policy(policy_file("hover")), SwapRoute().course(Shape(0.05, 0.12), 1 / 30)
-    with pytest.raises(ValueError, match="the policy observes the 2 nearest other vehicles; accepted: with a pose"):
+    with pytest.raises(
+        ValueError, match=r"the policy observes the 2 nearest other vehicles; accepted: with a pose .*, at most 0.1"
+    ):
         Runtime.of(policy, course, load_vehicle("vis_r"), imu=True)

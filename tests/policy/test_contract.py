@@ -13,6 +13,7 @@ import pytest
 
 from e2efly.config.domain import Extent
 from e2efly.policy.contract import ACTION_MAPPING, Contract
+from e2efly.policy.others import Company
 
 Path = tuple[str | int, ...]
 
@@ -147,6 +148,41 @@ def test_a_sensing_that_makes_no_sense_is_refused_by_name(key: str, value: Any, 
     text = json.dumps(EXAMPLE | {"sensing": [SENSED[0] | {key: value}, SENSED[1]]})
     with pytest.raises(ValueError, match=re.escape(said)):
         Contract.from_json(text)
+
+
+KNOWN = {"count": 2, "fields": ["others"], "max_age_s": 0.1, "range_m": 7.1, "speed_m_s": 5.0}
+"""What a policy needs to know of others."""
+AMONG = EXAMPLE | {
+    "others": KNOWN,
+    "observation": [
+        *EXAMPLE["observation"],
+        {"name": "others", "size": 6, "frame": "world", "unit": "m", "scale": 2.0, "description": "others"},
+    ],
+}
+
+
+def test_what_is_needed_of_others_is_kept_and_a_file_of_before_has_none() -> None:
+    contract = Contract.from_json(json.dumps(AMONG))
+    assert contract.others == Company(2, ("others",), 0.1, 7.1, 5.0)
+    assert Contract.from_json(contract.to_json()) == contract
+    assert Contract.from_json(json.dumps(EXAMPLE)).others is None
+    assert "others" not in json.loads(Contract.from_json(json.dumps(EXAMPLE)).to_json())
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("count", 3, "others.count is 3; accepted: 2, as in the observation"),
+        ("fields", ["othesr"], "others.fields[0] is 'othesr'; accepted: "),
+        ("max_age_s", 0.0, "others.max_age_s is 0.0; accepted: more than 0"),
+        ("range_m", -1.0, "others.range_m is -1.0; accepted: more than 0"),
+        ("speed_m_s", math.inf, "others.speed_m_s is inf; accepted: a finite number"),
+        ("rnage_m", 1.0, "unknown key 'others.rnage_m'; did you mean 'range_m'"),
+    ],
+)
+def test_a_need_of_others_that_makes_no_sense_is_refused_by_name(key: str, value: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        Contract.from_json(json.dumps(AMONG | {"others": KNOWN | {key: value}}))
 
 
 def test_layout() -> None:

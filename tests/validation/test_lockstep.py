@@ -1,6 +1,7 @@
 """Several vehicles of a world on plants, in lockstep."""
 
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 from e2efly.commands.cli import run
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import trace
-from e2efly.policy.others import FAR
+from e2efly.policy.others import FAR, Company
 from e2efly.validation.duels import duel
 from e2efly.validation.evaluation import SEED, act_of
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import nearest
 from e2efly.validation.plant_stress import stress
 from e2efly.validation.plant_validation import validate
+from e2efly.vehicles.loading import load_vehicle
 
 
 def at(x: float) -> RigidState:
@@ -37,6 +39,8 @@ def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[...,
     found = validate(policy_of("swap"), "simulator", 3, task={"agents": 4, "side": 4.0, "episode_s": 3.0})
     compared, (suite,) = found.criteria["swap"], found.candidate.task.criteria().values()
     assert len(compared.flights) == 4  # a whole world
+    needs = found.candidate.policy.contract.others
+    assert needs == Company(2, ("others", "others_velocity"), 0.1, 7.141, 5.0)  # of its training, with a side of 5 m
     env = found.candidate.at_home.environment(suite)
     n = env.whole(250)
     states, _, _, out = trace(env, act_of(found.candidate.policy), random_key(SEED, UNSEEN, 0), n, 60)
@@ -44,6 +48,20 @@ def test_a_world_flies_on_a_plant_as_in_the_environment(policy_of: Callable[...,
         assert not flight.fault
         np.testing.assert_allclose(flight.position[1:61], states.position[:, i], atol=2e-3)
         np.testing.assert_allclose(flight.observation[1:61], out.final_observation[:, i], atol=2e-2)
+
+
+def test_vehicles_of_a_world_do_not_pass_through_each_other_in_mujoco(policy_of: Callable[..., Path]) -> None:
+    """The hand-made policy flies straight to its place, through whoever is in the way."""
+    task = {"agents": 8, "side": 4.0, "height": 0.0, "collisions_end": False, "episode_s": 4.0}
+    nearest = {}
+    for plant in ("simulator", "mujoco"):
+        found = validate(policy_of("swap"), plant, 8, task=task, seed=2).criteria["swap"]
+        assert not any(flight.fault for flight in found.flights)
+        there = np.stack([flight.position for flight in found.flights])
+        pairs = combinations(range(8), 2)
+        nearest[plant] = min(float(np.linalg.norm(there[i] - there[j], axis=-1).min()) for i, j in pairs)
+    touch = 2 * load_vehicle("vis_r").radius
+    assert nearest["simulator"] < 0.7 * touch and 0.85 * touch < nearest["mujoco"] < 1.02 * touch
 
 
 def test_worlds_of_several_are_refused_where_one_flies_alone(policy_of: Callable[..., Path]) -> None:

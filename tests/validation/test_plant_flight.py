@@ -55,6 +55,8 @@ class Recorded:
             raise OSError("the link is gone")
         self.told.append((float(command[0]), dt))
 
+    def leave(self) -> None: ...
+
     def close(self) -> None: ...
 
 

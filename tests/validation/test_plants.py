@@ -18,7 +18,8 @@ from e2efly.validation.plant import Delay, Plant, RigidState
 from e2efly.validation.plants import find_plant
 from e2efly.validation.plants.airsim import AirsimPlant
 from e2efly.validation.plants.betaflight import BetaflightPlant
-from e2efly.validation.plants.mujoco import MujocoPlant, vehicle_xml
+from e2efly.validation.plants.mujoco import MujocoPlant, MujocoWorld
+from e2efly.validation.plants.mujoco_model import STEP, world_xml
 from e2efly.validation.plants.simulator import SimulatorPlant
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
@@ -224,9 +225,9 @@ def test_it_stands_on_its_feet(vis_r: Vehicle) -> None:
 
 
 def test_the_xml_is_of_this_vehicle_and_stands_alone(vis_r: Vehicle) -> None:
-    model = mujoco.MjModel.from_xml_string(vehicle_xml(vis_r))
+    model = mujoco.MjModel.from_xml_string(world_xml([vis_r]))
     assert model.nu == 7
-    heavier = mujoco.MjModel.from_xml_string(vehicle_xml(dataclasses.replace(vis_r, mass=0.9)))
+    heavier = mujoco.MjModel.from_xml_string(world_xml([dataclasses.replace(vis_r, mass=0.9)]))
     assert heavier.body_mass.sum() == pytest.approx(0.9)
 
 
@@ -253,6 +254,56 @@ def test_a_reset_forgets_everything(vis_r: Vehicle) -> None:
             states.append(plant.state)
         np.testing.assert_array_equal(states[0].position, states[1].position)
         np.testing.assert_array_equal(states[0].body_rate, states[1].body_rate)
+
+
+def company(vehicle: Vehicle, count: int) -> list[MujocoPlant]:
+    plants = [MujocoPlant(vehicle) for _ in range(count)]
+    MujocoWorld(plants, STEP)
+    return plants
+
+
+def test_two_vehicles_that_meet_push_each_other(vis_r: Vehicle) -> None:
+    """They do not pass through each other, and what one loses of its momentum, the other gains."""
+    still = dataclasses.replace(vis_r, drag_linear=np.zeros(3), drag_quadratic=np.zeros(3))
+    plants = company(still, 2)
+    for plant, x, speed in zip(plants, (0.0, 1.0), ([4.0, 0.5, 0.0], [0.0, 0.5, 0.0]), strict=True):
+        plant.reset(dataclasses.replace(at(velocity=speed), position=np.array([x, 0.0, 3.0])))
+    gaps, total = [], []
+    for _ in range(25):
+        for plant in plants:
+            plant.step(HOVER, 0.02)
+        gaps.append(plants[1].state.position[0] - plants[0].state.position[0])
+        total.append(plants[0].state.velocity[:2] + plants[1].state.velocity[:2])
+    assert 1.8 * still.radius < min(gaps) < 2 * still.radius
+    assert plants[1].state.velocity[0] >= plants[0].state.velocity[0] > 1.0
+    np.testing.assert_allclose(total, np.tile([4.0, 1.0], (25, 1)), atol=1e-6)
+
+
+def test_vehicles_that_are_far_apart_fly_as_alone(vis_r: Vehicle) -> None:
+    """Also with bodies of their own, and while another has left and falls."""
+    bodies = [vis_r, dataclasses.replace(vis_r, mass=1.2 * vis_r.mass)]
+    plants, commands = company(vis_r, 3), np.random.default_rng(0).uniform([8, -2, -2, -1], [14, 2, 2, 1], (30, 4))
+    plants[1].meet(bodies[1])
+    for i, plant in enumerate(plants):
+        plant.reset(dataclasses.replace(at(velocity=[1.0, i, 0.0]), position=np.array([0.0, 9.0 * i, 9.0])))
+        plant.disturb(np.array([i, 1.0, 0.0]), np.full(4, 1.0 - 0.1 * i))
+    plants[2].leave()
+    for command in commands:
+        for plant in plants[:2]:
+            plant.step(command, 0.02)
+    for i, plant in enumerate(plants[:2]):
+        alone = MujocoPlant(vis_r)
+        alone.meet(bodies[i])
+        alone.reset(dataclasses.replace(at(velocity=[1.0, i, 0.0]), position=np.array([0.0, 9.0 * i, 9.0])))
+        alone.disturb(np.array([i, 1.0, 0.0]), np.full(4, 1.0 - 0.1 * i))
+        for command in commands:
+            alone.step(command, 0.02)
+        for name in ("position", "velocity", "quaternion", "body_rate"):
+            np.testing.assert_allclose(getattr(plant.state, name), getattr(alone.state, name), atol=1e-9)
+    assert plants[2].state.velocity[2] < -3.0
+    plants[0].step(commands[0], 0.02)
+    with pytest.raises(ValueError, match=r"hold their commands for \[0.02, 0.01\] s; accepted: one time"):
+        plants[1].step(commands[0], 0.01)
 
 
 def sent(latency: float, count: int, period: float = 0.1) -> tuple[Delay, list[list[tuple[float, float]]]]:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import e2efly
-from e2efly.config import CameraConfig
+from e2efly.config import CameraConfig, ForestConfig
 from e2efly.environment import Env
 from e2efly.environment.stress_rows import ALL, ROWS
 from e2efly.simulation.scenes.scene import Scene
+from e2efly.tasks.avoid_together import AvoidTogetherConfig
 from e2efly.validation.evaluation import SEED, candidate
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_sight import PlantWatch, Sight
@@ -64,6 +65,37 @@ def test_images_are_those_of_the_environment_at_the_same_pose(task: str, camera:
     assert any((a[0] != b[0]).any() for a, b in zip(shown, shown[2:], strict=False))  # it did see something move
 
 
+def test_cameras_see_the_others_as_in_the_environment_and_never_their_own_vehicle() -> None:
+    """Where the others were when the camera looked. They are the only things in this world."""
+    forest = ForestConfig(density=0.0)
+    config = dataclasses.replace(e2efly.preset("avoid_together"), task=AvoidTogetherConfig(agents=3, forest=forest))
+    clear = {"latency": (0.05, 0.05), "fov": (2.6, 2.0), "noise_share": 0.0}
+    cameras = tuple(dataclasses.replace(c, **clear) for c in config.env.cameras)
+    env = Env.of(config.task, config.reward, dataclasses.replace(config.env, cameras=cameras))
+    first, _ = jax.jit(Env.reset, static_argnums=2)(env, jax.random.key(3), 3)
+    step, state, seen = jax.jit(partial(Env.step, restart=False)), first, []
+    history: list[list[RigidState]] = [[] for _ in range(3)]
+    rng, tilt = np.random.default_rng(0), np.array([[0.1, 0, 0.1, 0], [0.0, 0, -0.1, 0], [-0.2, 0, 0.0, 0]])
+    watches = [sight.begin() for sight in Starts(((),) * 3, (), first.memory, first.eyes).sights(env, 0) if sight]
+    for k in range(STEPS):
+        v = state.vehicle
+        rows = [np.asarray(x, np.float64) for x in (v.position, v.velocity, v.quaternion, v.body_rate)]
+        for i in range(3):
+            history[i].append(RigidState(*(x[i] for x in rows)))
+        now = [one[-1] for one in history]
+        for i, watch in enumerate(watches):
+            (ours,) = watch.images(k, history[i], now[:i] + now[i + 1 :])
+            np.testing.assert_allclose(ours, np.asarray(state.images[0])[i], rtol=1e-4, atol=1e-4, err_msg=f"step {k}")
+            gone = [dataclasses.replace(one, position=one.position + 1e3) for one in now[1:]]
+            (empty,) = watch.sight.begin().images(0, [history[i][-1]], gone)
+            seen.append(int((empty != ours).sum()) if k == 0 else 0)
+        with_noise = np.asarray(env.hover) + tilt + 0.1 * rng.standard_normal((3, 4))
+        state, _ = step(env, state, np.clip(with_noise, -1, 1).astype(np.float32))
+    assert sum(seen) > 0  # at the start two stand beside each other
+    with pytest.raises(ValueError, match=r"1 other vehicles; accepted: 2, as in the scene"):
+        watches[0].images(STEPS, history[0], now[:1])
+
+
 @pytest.mark.whole
 @pytest.mark.parametrize("plant", ["simulator", "mujoco"])
 def test_a_policy_flies_by_what_the_plant_sees(plant: str) -> None:
@@ -73,8 +105,8 @@ def test_a_policy_flies_by_what_the_plant_sees(plant: str) -> None:
 
 @pytest.mark.whole
 def test_a_policy_that_is_shown_nothing_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(self: PlantWatch, k: int, states: Any) -> list[np.ndarray]:
-        del k, states
+    def nothing(self: PlantWatch, k: int, states: Any, rest: Any) -> list[np.ndarray]:
+        del k, states, rest
         return [np.full((c.height, c.width), 0.0, np.float32) for c in self.sight.cameras]
 
     monkeypatch.setattr(PlantWatch, "images", nothing)

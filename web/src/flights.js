@@ -9,17 +9,19 @@ const WHY = "why.";
 /** @typedef {{wind: number[], mass: number, thrust: number, delay: number}} Conditions
  * Velocity of the air in the world, m/s; mass and thrust relative to the vehicle's file; s from an observation to its
  * command. */
-/** @typedef {{course: any, start: any, state: Record<string, number[]>, vehicle: Record<string, number[]>,
- *   time: number, goal: number[], observation: number[]}} World One vehicle and its task between two actions. */
+/** @typedef {{course: any, start: any, state: Record<string, number[]>, time: number,
+ *   vehicles: Record<string, number[]>[], goals: number[][], observations: number[][]}} World Its vehicles and their
+ *   task between two actions. */
 /** @typedef {{terminated: boolean, truncated: boolean, success: boolean, arrived: boolean, crashed: boolean,
- *   error: number, signals: string[]}} Outcome What a control step came to; what else the task says is true. */
+ *   error: number, signals: string[]}} Outcome What a control step came to: the world succeeds if all of its vehicles do
+ *   and ends with any of them; arrived and error are of the first. What else the task says is true of one. */
 /** @typedef {(observation: number[], memory: number[]) => {action: number[], memory: number[]}} Act */
 
 /** @typedef {object} Episode A flight that is watched.
  * @property {World} world now
  * @property {World} before a control step ago: what is drawn lies between the two
- * @property {number[]} memory the policy's
- * @property {number} arrivals how many goals were reached
+ * @property {number[][]} memories the policy's, for each vehicle
+ * @property {number} arrivals how many goals the first vehicle has reached
  * @property {Outcome | null} outcome of the last step
  * @property {Outcome | null} verdict the outcome that ended the episode; of its signals, those that became true then
  * @property {number} over seconds since it ended
@@ -41,13 +43,28 @@ export const policyOf = (flight) => (observation, memory) => {
   return { action: found.action, memory: found.next_memory ?? memory };
 };
 
+/** Numbers of all vehicles, one after the other, as those of each. @type {(numbers: number[], count: number) => number[][]} */
+function rows(numbers, count) {
+  const size = numbers.length / count;
+  return Array.from({ length: count }, (_, i) => numbers.slice(i * size, (i + 1) * size));
+}
+
 /** @type {(course: any, start: any, state: Record<string, number[]>) => World} */
 function worldOf(course, start, state) {
+  const { agents } = course;
   const own = Object.entries(state).filter(([name]) => name.startsWith(VEHICLE));
-  const vehicle = Object.fromEntries(own.map(([name, numbers]) => [name.slice(VEHICLE.length), numbers]));
+  const each = own.map(([name, numbers]) => /** @type {const} */ ([name.slice(VEHICLE.length), rows(numbers, agents)]));
+  const vehicles = Array.from({ length: agents }, (_, i) => Object.fromEntries(each.map(([name, of]) => [name, of[i]])));
   const { observation, goal } = run(course.look, state);
-  return { course, start, state, vehicle, time: state.time[0], goal, observation };
+  const [observations, goals] = [rows(observation, agents), rows(goal, agents)];
+  return { course, start, state, time: state.time[0], vehicles, goals, observations };
 }
+
+/** What the policy does with each vehicle. @type {(world: World, act: Act, memories: number[][]) => ReturnType<Act>[]} */
+const acted = (world, act, memories) => world.observations.map((observation, i) => act(observation, memories[i]));
+
+/** The policy's memories at the start. @type {(flight: any, world: World) => number[][]} */
+const empty = (flight, world) => world.vehicles.map(() => Array(flight.memory_size).fill(0));
 
 /** A world that begins. @type {(flight: any, course: number, start: number) => World} */
 function begun(flight, course, start) {
@@ -61,8 +78,7 @@ function begun(flight, course, start) {
 /** The beginning of an episode. @type {(flight: any, course: number, start: number) => Episode} */
 export function episodeOf(flight, course, start) {
   const world = begun(flight, course, start);
-  const memory = Array(flight.memory_size).fill(0);
-  return { world, before: world, memory, arrivals: 0, outcome: null, verdict: null, over: 0, still: false };
+  return { world, before: world, memories: empty(flight, world), arrivals: 0, outcome: null, verdict: null, over: 0, still: false };
 }
 
 /** The same, pushed and spun at random. @type {(episode: Episode) => Episode} */
@@ -75,54 +91,59 @@ export function thrown(episode) {
   return { ...episode, world: worldOf(course, start, after) };
 }
 
-/** One control step under an action in [-1, 1].
- * @type {(world: World, action: number[], conditions: Conditions) => {world: World, outcome: Outcome}} */
-function advance(world, action, conditions) {
+/** One control step under an action in [-1, 1] for each vehicle.
+ * @type {(world: World, actions: number[][], conditions: Conditions) => {world: World, outcome: Outcome}} */
+function advance(world, actions, conditions) {
   const hands = Object.entries(conditions).map(([name, value]) => [`hands.${name}`, [value].flat()]);
-  const found = run(world.course.step, { ...world.state, ...Object.fromEntries(hands), action });
-  const [terminated, truncated, success, arrived, crashed] = [
-    found.terminated, found.truncated, found.success, found.arrived, found.crashed,
-  ].map(([yes]) => yes !== 0);
-  const raised = Object.keys(found).filter((name) => name.startsWith(WHY) && found[name][0]);
+  const found = run(world.course.step, { ...world.state, ...Object.fromEntries(hands), action: actions.flat() });
+  const any = (/** @type {number[]} */ flags) => flags.some((yes) => yes !== 0);
+  const [terminated, truncated, crashed] = [found.terminated, found.truncated, found.crashed].map(any);
+  const success = found.success.every((yes) => yes !== 0);
+  const arrived = found.arrived[0] !== 0;
+  const raised = Object.keys(found).filter((name) => name.startsWith(WHY) && any(found[name]));
   const signals = raised.map((name) => name.slice(WHY.length));
   const reached = Object.fromEntries(Object.keys(world.state).map((name) => [name, found[name]]));
   const outcome = { terminated, truncated, success, arrived, crashed, error: found.error[0], signals };
   return { world: worldOf(world.course, world.start, reached), outcome };
 }
 
-/** A control step later. After its end the vehicle flies on, unless it crashed or has nothing more to fly.
+/** A control step later. After its end the vehicles fly on, unless one crashed or has nothing more to fly.
  * @type {(episode: Episode, act: Act, conditions: Conditions) => Episode} */
 export function stepped(episode, act, conditions) {
   const { period } = episode.world.course;
   const over = episode.verdict === null ? 0 : episode.over + period;
   if (episode.still) return { ...episode, before: episode.world, over };
-  const { action, memory } = act(episode.world.observation, episode.memory);
-  const { world, outcome } = advance(episode.world, action, conditions);
+  const asked = acted(episode.world, act, episode.memories);
+  const { world, outcome } = advance(episode.world, asked.map(({ action }) => action), conditions);
   const first = episode.verdict === null && (outcome.terminated || outcome.truncated);
   const signals = outcome.signals.filter((name) => !episode.outcome?.signals.includes(name));
   const verdict = first ? { ...outcome, signals } : episode.verdict;
   const still = outcome.crashed || (outcome.terminated && !first);
   const arrivals = episode.arrivals + Number(outcome.arrived);
-  return { world, before: episode.world, memory, arrivals, outcome, verdict, over, still };
+  const memories = asked.map(({ memory }) => memory);
+  return { world, before: episode.world, memories, arrivals, outcome, verdict, over, still };
 }
 
 /** Fly from a start for some seconds, whatever happens on the way.
  * @param {any} flight
  * @param {Act} act
  * @param {{course?: number, start?: number, seconds: number, conditions: Conditions}} options
- * @returns {any[]} each control step: time, state, observation, action and outcome */
+ * @returns {any[]} each control step: time, outcome; state, observation and action of the first vehicle, and of the others */
 export function fly(flight, act, { course = 0, start = 0, seconds, conditions }) {
   let world = begun(flight, course, start);
-  let memory = Array(flight.memory_size).fill(0);
-  const rows = [];
+  let memories = empty(flight, world);
+  const flown = [];
   for (let i = 0; i < Math.round(seconds / world.course.period); i++) {
-    const { observation } = world;
-    const asked = act(observation, memory);
-    const reached = advance(world, asked.action, conditions);
+    const { observations } = world;
+    const asked = acted(world, act, memories);
+    const reached = advance(world, asked.map(({ action }) => action), conditions);
     world = reached.world;
-    memory = asked.memory;
+    memories = asked.map(({ memory }) => memory);
     const { signals, ...judged } = reached.outcome;
-    rows.push({ time: world.time, ...world.vehicle, observation, action: asked.action, ...judged });
+    const [own, ...others] = world.vehicles.map((vehicle, j) => ({
+      ...vehicle, observation: observations[j], action: asked[j].action,
+    }));
+    flown.push({ time: world.time, ...own, others, ...judged });
   }
-  return rows;
+  return flown;
 }

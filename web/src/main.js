@@ -89,7 +89,7 @@ async function begin() {
         ...options,
         conditions: { ...conditionsOf(numbers), ...conditions },
       }),
-    now: () => ({ time: episode.world.time, ...episode.world.vehicle, verdict: episode.verdict }),
+    now: () => ({ time: episode.world.time, ...episode.world.vehicles[0], verdict: episode.verdict }),
   };
 }
 

@@ -37,6 +37,7 @@ from e2efly.flight.settings import check as check_settings
 from e2efly.flight.sight.sources import open_cameras
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import Policy, load_policy
+from e2efly.policy.others import USUAL
 from e2efly.policy.runtime import Envelope, Runtime, check
 from e2efly.policy.worker import PolicyWorker
 from e2efly.policy.zoo import FOLDER, policy_file
@@ -266,6 +267,7 @@ def run(options: Fly) -> int:
         source = open_source(options.pose)
         stack.callback(source.close)
         others = [stack.enter_context(closing(open_source(uri))) for uri in options.others]
+        needs = (contract.others if contract else None) or USUAL
         commands = None if options.commands is None else open_commands(options.commands)
         if commands is not None:
             stack.callback(commands.close)
@@ -283,7 +285,7 @@ def run(options: Fly) -> int:
             autopilot, source, body, settings, worker=worker, latency=options.latency,
             settings_problems=problems(rows), throttle_map=plan.known, cameras=cameras,
             filter=plan.filter, hover=hover,
-            neighbours=Neighbours(others, settings.odometry_timeout) if others else None,
+            neighbours=Neighbours(others, settings.odometry_timeout, needs) if others else None,
         )  # fmt: skip
         source.read(time.monotonic())  # what came while the controller was asked is old
         if options.check:

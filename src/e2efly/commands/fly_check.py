@@ -100,6 +100,10 @@ def look(
     if bridge.odometry is not None:
         add_sensing(table, bridge.estimate, contract)
     add_images(table, bridge, [len(taken) / (now - start) for taken in times], policy)
+    if (others := bridge.neighbours) is not None:
+        here = None if bridge.odometry is None else bridge.odometry.position
+        good = f"{len(others.sources)} seen; needed: {others.needs.told}"
+        table.add_row("others", _cell(others.problem(now, here, begins=True) or good))
     if isinstance(bridge.worker, Commander):
         table.add_row("commands", _cell(_commands(bridge.worker, bridge)))
     pilot = bridge.inputs.pilot

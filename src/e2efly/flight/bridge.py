@@ -266,7 +266,8 @@ class Bridge:
 
     def _blindness(self, now: float) -> str | None:
         """Why a policy must not act on the newest images, or among the other vehicles. None: it may."""
-        lost = None if self.neighbours is None else self.neighbours.problem(now)
+        here, begins = None if self.odometry is None else self.odometry.position, self.flight.mode is not Mode.POLICY
+        lost = None if self.neighbours is None else self.neighbours.problem(now, here, begins)
         return next((problem for seen in self.seen if (problem := seen.problem(now))), lost)
 
     @property

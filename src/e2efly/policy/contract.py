@@ -19,6 +19,7 @@ from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
 from e2efly.policy.observation import OTHERS, PAST_ACTIONS, Field, Own, own_fields
+from e2efly.policy.others import Company
 from e2efly.policy.zoo import contents
 from e2efly.vehicles.family import Ranges
 from e2efly.vehicles.gravity import GRAVITY
@@ -37,8 +38,8 @@ ACTION_MAPPING = "command = low + (action + 1) / 2 * (high - low)"
 """Mapping from an action to a physical command, entry by entry."""
 RATES = (0.1, 10_000.0)
 """Smallest and largest control rate, Hz."""
-OPTIONAL = ("vehicles", "courses", "sensing")
-"""Fields that a contract may leave out: ranges that its training did not declare."""
+OPTIONAL = ("vehicles", "courses", "sensing", "others")
+"""Fields that a contract may leave out: what its training did not declare."""
 FRAMES = ("world", "body", "world_body", "none")
 """Frames of an observation field."""
 SENSING = {
@@ -140,6 +141,9 @@ class Contract:
     sensing: Domain | None = None
     """Ranges of the lags, ages and holes of the observed state in training: the quantities of `SENSING`. None, and no
     JSON key: not declared, as in files of before."""
+    others: Company | None = None
+    """What it needs to know of other vehicles. None, and no JSON key: it observes none, or not declared, as in files of
+    before."""
 
     def outside(self, courses: Domain) -> tuple[str, ...]:
         """The quantities in which courses lie outside of what it was trained for, in words. Empty: in none, or its
@@ -296,6 +300,7 @@ def _contract(x: dict[str, Any]) -> Contract:
     if vehicle_hash is not None and (len(vehicle_hash) != 16 or set(vehicle_hash) - set("0123456789abcdef")):
         raise read.refusal("vehicle_hash", vehicle_hash, "16 hex digits in lower case")
     action = _action(x["action"])
+    observation = _observation(x["observation"], action.size)
     hover = read.numbers(x["hover_action"], "hover_action", action.size)
     if not all(ACTION_LIMITS[0] <= value <= ACTION_LIMITS[1] for value in hover):
         raise read.refusal("hover_action", list(hover), f"{action.size} numbers in [-1, 1]")
@@ -309,14 +314,15 @@ def _contract(x: dict[str, Any]) -> Contract:
         latency_s=latency_s,
         latency_range_s=latency,
         observation_latency_range_s=read.seconds_range(x["observation_latency_range_s"], "observation_latency_range_s"),
-        observation=_observation(x["observation"], action.size),
+        observation=observation,
         images=_images(x["images"], rate),
         memory_size=read.whole(x["memory_size"], "memory_size", 0),
         action=action,
         hover_action=hover,
         vehicle_ranges=None if vehicle_hash is not None else _ranges(x["vehicle_ranges"]),
-        **{name: None if x[name] is None else _domain(x[name], name) for name in OPTIONAL if name != "sensing"},
+        **{name: None if x[name] is None else _domain(x[name], name) for name in ("vehicles", "courses")},
         sensing=None if x["sensing"] is None else _sensing(x["sensing"]),
+        others=None if x["others"] is None else _company(x["others"], observation),
     )
 
 
@@ -329,6 +335,19 @@ def _sensing(value: Any) -> Domain:
         if part.low < 0:
             raise read.refusal(f"sensing[{i}].low", part.low, "0 or more")
     return found
+
+
+def _company(value: Any, observation: tuple[Field, ...]) -> Company:
+    x, known = read.table(value, "others", Company), {field.name: field.size for field in observation}
+    count, shown = read.whole(x["count"], "others.count", 1), read.entries(x["fields"], "others.fields", None)
+    fields = tuple(read.one_of(name, f"others.fields[{i}]", known) for i, name in enumerate(shown))
+    if known.get(OTHERS, 0) != 3 * count:
+        raise read.refusal("others.count", count, f"{known.get(OTHERS, 0) // 3}, as in the observation")
+    numbers = {name: read.number(x[name], f"others.{name}") for name in ("max_age_s", "range_m", "speed_m_s")}
+    for name, number in numbers.items():
+        if number <= 0:
+            raise read.refusal(f"others.{name}", number, "more than 0")
+    return Company(count, fields, **numbers)
 
 
 def _domain(value: Any, field: str) -> Domain:

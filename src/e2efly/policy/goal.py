@@ -11,7 +11,7 @@ from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
 from e2efly.policy.observation import Field
-from e2efly.policy.others import Others
+from e2efly.policy.others import Company, Others
 
 
 class Body(Protocol):
@@ -131,6 +131,11 @@ class Goal:
     def neighbours(self) -> int:
         """Number of the nearest other vehicles that the policy observes."""
         return 0
+
+    @property
+    def company(self) -> Company | None:
+        """What the policy needs to know of the others, for its contract. None: not declared."""
+        return None
 
     def among(self, memory: Any, others: Others) -> Any:
         """The task's state with what is known of the others, for a goal that has `neighbours`."""

@@ -3,6 +3,7 @@
 The same code in training, where the others are rows of the batch, and in flight, where they are tracked poses.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,32 @@ from e2efly.policy.observation import OTHERS, Field
 
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
+
+
+@dataclass(frozen=True)
+class Company:
+    """What a policy needs to know of the other vehicles: how many, what of them, how late and how far."""
+
+    count: int
+    """Number of the nearest others that it observes."""
+    fields: tuple[str, ...]
+    """Names of the observation fields that show them."""
+    max_age_s: float
+    """Largest age of another's pose, s. Until then it is taken to have flown on with its velocity."""
+    range_m: float
+    """Distance up to which they must be seen, m: the size of the worlds of the training."""
+    speed_m_s: float
+    """Largest speed of another, m/s: how fast one that is not seen may come nearer."""
+
+    @property
+    def told(self) -> str:
+        """What a source of their poses must give, in words."""
+        near = "" if math.isinf(self.range_m) else f"seen up to {self.range_m:.3g} m, "
+        return f"{near}at most {self.max_age_s:g} s old"
+
+
+USUAL = Company(0, (), 0.1, math.inf, 5.0)
+"""What is asked where no contract says it."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +78,9 @@ def others_fields(count: int) -> tuple[Field, Field]:
         Field(OTHERS, 3 * count, "world", "m", 2.0, where),
         Field("others_velocity", 3 * count, "world", "m/s", 2.0, motion),
     )
+
+
+def company_of(count: int, range_m: float, speed_m_s: float) -> Company:
+    """What a policy needs that observes `others_fields` of the `count` nearest others."""
+    fields = tuple(field.name for field in others_fields(count))
+    return Company(count, fields, USUAL.max_age_s, round(range_m, 3), speed_m_s)

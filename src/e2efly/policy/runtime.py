@@ -17,7 +17,7 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.goal import Course, Outcome
 from e2efly.policy.observation import Field, Known, own_fields
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
-from e2efly.policy.others import Others
+from e2efly.policy.others import USUAL, Others
 from e2efly.vehicles.vehicle import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
@@ -115,9 +115,10 @@ class Runtime:
         contract, envelope = policy.contract, envelope or Envelope()
         reasons = check(contract, vehicle, course.goal.fields, control_rate, imu=imu, images=images, rotors=rotors)
         if (count := getattr(course.goal, "neighbours", 0)) and not others:
+            told = (getattr(contract, "others", None) or USUAL).told
             reasons += (
                 f"the policy observes the {count} nearest other vehicles; accepted: with a pose source for each other "
-                "vehicle (fly --others)",
+                f"vehicle (fly --others), {told}",
             )
         for name, value in dataclasses.asdict(envelope).items():
             if value is not None and not value > 0:

@@ -134,7 +134,9 @@ def _fly_chunk(mission: FleetMission, flights: Sequence[FleetFlight]) -> list[Tr
 def _fly(mission: FleetMission, flights: Sequence[FleetFlight]) -> Iterator[Trajectory]:
     policy, kind, agents = mission.acting(), mission.kind(), mission.agents
     with ExitStack() as stack:
-        plants = [stack.enter_context(closing(kind.of(mission.believed, policy.contract))) for _ in range(agents)]
+        plants = kind.company(mission.believed, policy.contract, agents)
+        for plant in plants:
+            stack.enter_context(closing(plant))
         met = [(mission.believed.hash, False)] * agents
         for first in range(0, len(flights), agents):
             world = flights[first : first + agents]

@@ -18,6 +18,7 @@ from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.policy.odometry import Sample
+from e2efly.policy.others import USUAL
 from e2efly.policy.runtime import Acting
 from e2efly.tasks.route import Route, course_for
 from e2efly.validation.bridge_session import Session, open_fence, rehearsal_settings
@@ -99,7 +100,7 @@ def fly_formation(
             session = Session(
                 rig, rehearsal_settings(start[2] - vehicle.feet_height, fence=open_fence(vehicle, REACH)),
                 policy=policy, course=course, hover=hover_controller(HOVER, vehicle, latency + LINK_S),
-                neighbours=Neighbours(others, 0.1),
+                neighbours=Neighbours(others, 0.1, policy.contract.others or USUAL),
             )  # fmt: skip
             stack.callback(session.close)
             sessions.append(session)

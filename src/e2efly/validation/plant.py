@@ -129,6 +129,17 @@ class Plant(ABC):
         return cls(vehicle, contract.action.mode)  # type: ignore[call-arg]
 
     @classmethod
+    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> list[Self]:
+        """The plants of the vehicles of a world. Unless a plant does it otherwise, each is in a physics of its own: it
+        flies through the others.
+
+        Raises:
+            ValueError: for anything that it cannot simulate.
+            OSError: when it cannot be started.
+        """
+        return [cls.of(vehicle, contract) for _ in range(count)]
+
+    @classmethod
     def at(cls, address: str) -> type[Self]:
         """The plant that another program simulates at an address.
 
@@ -174,13 +185,16 @@ class Plant(ABC):
 
     @abstractmethod
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command for `dt` s.
+        """Hold a command for `dt` s. In a world of several, time may pass only when all have commanded the same time.
 
         Args:
             command: (4,) in the units of the command mode with which the plant was made (`COMMAND_MODES`). For `ctbr`:
                 collective thrust over mass, m/s^2, and body rates, rad/s.
             dt: seconds, above zero.
         """
+
+    def leave(self) -> None:  # noqa: B027
+        """The flight is over. Among others of the same physics, it is in their way without power until `reset`."""
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
         """Fly another body from the next `reset` on. The flight controller stays tuned to the plant's vehicle.

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -68,26 +69,31 @@ class Trajectory:
     """Moments between control steps, if they were requested."""
 
 
-Flying = Generator[RigidState, Sequence[RigidState], Trajectory]
-"""A flight, step by step."""
+Flying = Generator[RigidState | None, Sequence[RigidState] | None, Trajectory]
+"""A flight, step by step. It gives its state at the beginning of each control step and is sent those of all others;
+then it gives None for each command that it holds, and time passes.
+"""
 
 
 def together(flights: Sequence[Flying]) -> list[Trajectory]:
-    """Fly several vehicles of a world in lockstep, each on its own plant: they see each other, and do not touch.
+    """Fly several vehicles of a world in lockstep.
 
-    It ends when all have ended. One that has ended stays where it was.
+    They see each other. Where their plants are of one physics (`Plant.company`), they also push each other. It ends
+    when all have ended. One that has ended is seen where it was.
     """
     now, ended = [next(flight) for flight in flights], dict[int, Trajectory]()
     while len(ended) < len(flights):
-        before = list(now)
-        for i, flight in enumerate(flights):
-            if i in ended:
-                continue
-            rest = [state for j, state in enumerate(before) if j != i]
-            try:
-                now[i] = flight.send(rest)
-            except StopIteration as end:
-                ended[i] = end.value
+        flying_on = [i for i in range(len(flights)) if i not in ended]
+        given: dict[int, Any] = {i: [state for j, state in enumerate(now) if j != i] for i in flying_on}
+        while flying_on:
+            for i in tuple(flying_on):
+                try:
+                    reached = flights[i].send(given.pop(i, None))
+                except StopIteration as end:
+                    ended[i], reached = end.value, now[i]
+                if reached is not None:
+                    now[i] = reached
+                    flying_on.remove(i)
     return [ended[i] for i in range(len(flights))]
 
 
@@ -99,13 +105,12 @@ def flying(
     latency: float,
     air: Air | None = None,
     sample: float | None = None,
-    images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
+    images: Callable[[int, Sequence[RigidState], Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
     law: LawStep | None = None,
 ) -> Flying:
     """Fly from one start until the time is over, or the task is done or has failed.
 
-    It gives its state before each control step, and is sent those of all others (`together`). Among others it goes on
-    when its task is done, as it is in their way.
+    `together` drives it. Among others it goes on when its task is done, as it is in their way.
 
     Args:
         runtime: policy, contract and course.
@@ -115,7 +120,7 @@ def flying(
         latency: time from observation to command, s.
         air: wind, thrust and errors of the policy's state in each step. None: still air, full thrust, no errors.
         sample: longest time between two samples, s. None: no samples are kept.
-        images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
+        images: the cameras' images, by control step, the states until then and the others now (`PlantWatch.images`).
         law: the control steps of the flight under a law of the stress.
 
     Returns:
@@ -147,7 +152,7 @@ def flying(
             if law is not None and felt is not None:
                 seen, felt = observed(law.at(k), felt, truth if seen is None else seen, period)
                 measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
-            shown = () if images is None else images(k, states)
+            shown = () if images is None else images(k, states, rest or ())
             others = nearest(states[-1], rest, runtime.course.goal.neighbours) if rest else None
             memory, decision = act(runtime, memory, truth, now, measured, seen=seen, images=shown, others=others)
             if memory.failure or (memory.done and not rest):
@@ -167,6 +172,7 @@ def flying(
                 count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
                 for _ in range(count):
                     plant.step(acting, seconds / count)
+                    yield None
                     at += seconds / count
                     if sample is not None:
                         samples.append(FlightSample.of(plant, at))
@@ -176,6 +182,7 @@ def flying(
             break
         decisions.append(decision)
         states.append(reached)
+    plant.leave()
     if not (memory.done or memory.failure):
         memory = judged(runtime, memory, states[-1].odometry(period * len(decisions)), period * len(decisions))
     return Trajectory(

@@ -3,6 +3,7 @@
 Rate, age, mounting and noise of the images are those of the training environment. Its cameras draw them.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -13,7 +14,7 @@ from jaxtyping import Array, PRNGKeyArray
 
 from e2efly.config import CameraConfig
 from e2efly.simulation.physics import State
-from e2efly.simulation.scenes.scene import Scene
+from e2efly.simulation.scenes.scene import VEHICLE, Scene
 from e2efly.simulation.sensors.eyes import Eye, see, steps_between
 from e2efly.simulation.sensors.latency import delayed_state, frames
 from e2efly.validation.plant import RigidState, Shutter
@@ -68,10 +69,11 @@ class PlantWatch:
     shown: list[np.ndarray] = field(default_factory=list)
     """The last image of each camera."""
 
-    def images(self, k: int, states: Sequence[RigidState]) -> list[np.ndarray]:
+    def images(self, k: int, states: Sequence[RigidState], rest: Sequence[RigidState] = ()) -> list[np.ndarray]:
         """The policy's images in control step `k`: for each camera the newest image, (h, w) or (h, w, 3).
 
-        Steps must be requested in order. `states` are those of the vehicle until now, one per control step.
+        Steps must be requested in order. `states` are those of the vehicle until now, one per control step. `rest` are
+        the other vehicles of its world now.
         """
         sight = self.sight
         for i, (camera, eye) in enumerate(zip(sight.cameras, sight.eyes, strict=True)):
@@ -82,9 +84,34 @@ class PlantWatch:
                 continue
             newest = [states[max(len(states) - 1 - age, 0)] for age in range(frames(sight.oldest, sight.period) + 1)]
             key = jax.random.fold_in(jax.random.fold_in(jax.random.key(sight.seed), k), i)
-            image = rendered(camera, eye, sight.scene, newest, k * sight.period, sight.period, key)
+            scene = with_others(sight.scene, rest, k * sight.period)
+            image = rendered(camera, eye, scene, newest, k * sight.period, sight.period, key)
             self.shown[i : i + 1] = [image]
         return self.shown
+
+
+def with_others(scene: Scene, rest: Sequence[RigidState], now: float) -> Scene:
+    """One world, whose solids of the class vehicle are these others at `now`, s.
+
+    They have flown straight on until then, as in the environment (`company.spheres`): a camera sees each where it was
+    when the camera looked.
+
+    Raises:
+        ValueError: for another number of others than there are such solids.
+    """
+    others = {kind: np.flatnonzero(np.asarray(solids.label)[0] == VEHICLE) for kind, solids in scene.solids.items()}
+    if sum(map(len, others.values())) != len(rest):
+        raise ValueError(f"{len(rest)} other vehicles; accepted: {sum(map(len, others.values()))}, as in the scene")
+    found, left = dict(scene.solids), list(rest)
+    for kind, columns in others.items():
+        if len(columns):
+            here, left = left[: len(columns)], left[len(columns) :]
+            solids, velocity = found[kind], np.stack([other.velocity for other in here])
+            begun = np.stack([other.position for other in here]) - now * velocity
+            places, motion = np.array(solids.centre), np.array(solids.velocity)
+            places[0, columns], motion[0, columns] = begun, velocity
+            found[kind] = dataclasses.replace(solids, centre=places, velocity=motion)
+    return dataclasses.replace(scene, solids=found)
 
 
 def rendered(

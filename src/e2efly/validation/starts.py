@@ -56,11 +56,6 @@ class Starts:
         """
         if not env.cameras:
             return [None] * len(self)
-        if env.agents > 1:
-            raise ValueError(
-                f"task.agents is {env.agents} and the policy sees images; accepted: one vehicle in a world, as the "
-                "images of a flight on a plant do not show others (`e2efly eval` does)"
-            )
         cameras, eyes = env.cameras, self.eyes
         if changed is not None:
             cameras, eyes = with_noise(cameras), changed.eyes(cameras, eyes, env.control_period)

@@ -186,12 +186,14 @@ def test_the_page_has_the_physics_of_every_vehicle(
 
 def test_every_world_of_a_task_is_tested() -> None:
     tested = {candidate(name).task.name for name in POLICIES} | set(STATED)
-    alone = [task for task in TASKS.values() if not hasattr(task(), "agents")]
-    assert {TASKS[name].world for name in tested} == {task.world for task in alone}
+    assert {TASKS[name].world for name in tested} == {task.world for task in TASKS.values()}
 
 
-STATED = ("avoid", "dodge", "hall", "hover_payload", "land_visual", "race_clutter", "race_speed")
-"""Tasks of cameras and of loads, whose worlds fly without them, too, and of random worlds."""
+STATED = (
+    "avoid", "dodge", "hall", "hover_payload", "land_visual", "race_clutter", "race_speed", "avoid_together",
+    "race_duel", "swap",
+)  # fmt: skip
+"""Tasks of cameras and of loads, whose worlds fly without them, too, of random worlds, and of several vehicles."""
 
 
 @pytest.mark.whole
@@ -205,23 +207,28 @@ def test_a_page_flies_any_task(name: str, race_page: Opened, monkeypatch: pytest
 
 
 def flies_as_python_does(page: Opened, env: Env, task: TaskConfig, actions: np.ndarray) -> None:
-    """The first start, under given actions."""
-    steps = len(actions)
+    """The first start, under given actions, which are those of all vehicles."""
+    steps, agents = len(actions), env.agents
     about = {"courses": [course(env, task, starts=2)], "memory_size": 0}
-    flown = page.fly(numbers=about, actions=actions.tolist(), seconds=steps * env.control_period)
-    states, _, _, out = trace(env, given(actions), random_key(SEED, UNSEEN, 0), 2, steps)
-    for name in ("position", "velocity", "quaternion", "body_rate"):
-        np.testing.assert_allclose(flown[name], getattr(states, name)[:, 0], rtol=0, atol=5e-4, err_msg=name)
-    np.testing.assert_allclose(flown["rotor_speed"], states.rotor_speed[:, 0], rtol=1e-4)
-    np.testing.assert_allclose(flown["observation"][1:], out.final_observation[:-1, 0], rtol=0, atol=5e-3)
-    for name in ("terminated", "truncated", "success"):
-        np.testing.assert_array_equal(flown[name], getattr(out, name)[:, 0], err_msg=name)
+    each = np.repeat(actions, agents, axis=0).tolist()
+    flown = page.fly(numbers=about, actions=each, seconds=steps * env.control_period)
+    states, _, _, out = trace(env, given(actions, 2 * agents), random_key(SEED, UNSEEN, 0), 2 * agents, steps)
+    vehicles = [flown, *({name: np.array([row[i][name] for row in flown["others"]]) for name in flown["others"][0][i]}
+                         for i in range(agents - 1))]  # fmt: skip
+    for i, vehicle in enumerate(vehicles):
+        for name in ("position", "velocity", "quaternion", "body_rate"):
+            np.testing.assert_allclose(vehicle[name], getattr(states, name)[:, i], rtol=0, atol=5e-4, err_msg=name)
+        np.testing.assert_allclose(vehicle["rotor_speed"], states.rotor_speed[:, i], rtol=1e-4)
+        np.testing.assert_allclose(vehicle["observation"][1:], out.final_observation[:-1, i], rtol=0, atol=5e-3)
+    for name in ("terminated", "truncated"):
+        np.testing.assert_array_equal(flown[name], getattr(out, name)[:, :agents].any(1), err_msg=name)
+    np.testing.assert_array_equal(flown["success"], out.success[:, :agents].all(1))
     np.testing.assert_allclose(flown["error"], out.error[:, 0], rtol=0, atol=1e-3)
 
 
-def given(actions: np.ndarray) -> Act:
+def given(actions: np.ndarray, count: int) -> Act:
     """A policy whose actions are given; its memory counts."""
-    return Act(lambda observation, images, memory: (np.tile(actions[int(memory[0])], (2, 1)), memory + 1), np.zeros)
+    return Act(lambda observation, images, memory: (np.tile(actions[int(memory[0])], (count, 1)), memory + 1), np.zeros)
 
 
 @pytest.mark.whole

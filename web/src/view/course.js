@@ -1,4 +1,4 @@
-// What a task has in space: its solids, its lines and faces, and where the vehicle is to be.
+// What a task has in space: its solids, its lines and faces, and where the vehicles are to be.
 import * as THREE from "three";
 import { bytesOf } from "../machine.js";
 import { surface } from "./colours.js";
@@ -22,20 +22,23 @@ export function courseOf(world, colour) {
   for (const points of faces) group.add(face(points, colour.target));
   for (const { point, text } of marks) group.add(label(text, point, colour.gate));
   const light = new THREE.MeshBasicMaterial({ color: colour.next, transparent: true, opacity: 0.7 });
-  const goal = new THREE.Mesh(new THREE.SphereGeometry(0.03, 24, 16), light);
-  group.add(goal);
+  const goals = world.goals.map(() => new THREE.Mesh(new THREE.SphereGeometry(0.03, 24, 16), light));
+  group.add(...goals);
   return {
     group,
-    update({ time, goal: place }) {
-      const [x, y, z] = place;
-      goal.position.set(x, y, z);
-      goal.visible = true;
+    update({ time, goals: places }) {
+      for (const [i, goal] of goals.entries()) {
+        const [x, y, z] = places[i];
+        goal.position.set(x, y, z);
+        goal.visible = true;
+      }
       for (const solid of standing) {
         if (solid.path) solid.mesh.position.copy(solid.path(time));
-        const next = !solid.isWall && solid.middle.distanceTo(goal.position) < AROUND;
+        const inside = goals.filter((goal) => !solid.isWall && solid.middle.distanceTo(goal.position) < AROUND);
+        const next = inside.length > 0;
         solid.mesh.material.color.copy(next ? colour.next : solid.paint);
         solid.mesh.material.emissive.copy(solid.mesh.material.color).multiplyScalar(next ? 0.35 : 0.05);
-        if (next) goal.visible = false;
+        for (const goal of inside) goal.visible = false;
       }
     },
   };
@@ -99,12 +102,12 @@ function label(words, [x, y, z], colour) {
   return sprite;
 }
 
-/** The box in which a course lies, from where its vehicle starts. @type {(world: World) => THREE.Box3} */
+/** The box in which a course lies, from where its vehicles start. @type {(world: World) => THREE.Box3} */
 export function extent(world) {
   const { solids, lines, faces } = world.course.scenes[world.start.scene];
   const around = solids.filter((/** @type {any} */ solid) => solid.label !== "wall");
   const box = new THREE.Box3();
-  for (const [x, y, z] of [world.vehicle.position, world.goal, ...lines.flat(), ...faces.flat()]) {
+  for (const [x, y, z] of [...world.vehicles.map((one) => one.position), ...world.goals, ...lines.flat(), ...faces.flat()]) {
     box.expandByPoint(new THREE.Vector3(x, y, z));
   }
   for (const solid of around) box.expandByPoint(drawn(solid, {}).middle);

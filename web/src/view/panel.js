@@ -8,13 +8,14 @@ const SLIDERS = ["wind", "direction", "mass", "thrust", "delay"];
 
 /** Fill in what does not change. @type {(flight: any) => void} */
 export function describe(flight) {
-  const { period, latency, latest } = flight.courses[0];
+  const { agents, period, latency, latest } = flight.courses[0];
   const words = flight.task.replaceAll("_", " ");
   const title = words.slice(0, 1).toUpperCase() + words.slice(1);
   document.title = `${title}: ${flight.vehicle}, e2efly`;
   element("title").textContent = title;
   const trained = flight.vehicle === flight.trained_on ? "" : `, policy of ${flight.trained_on}`;
-  element("vehicle").textContent = `${flight.vehicle}${trained}, ${Math.round(1 / period)} Hz`;
+  const count = agents > 1 ? `${agents} × ` : "";
+  element("vehicle").textContent = `${count}${flight.vehicle}${trained}, ${Math.round(1 / period)} Hz`;
   const delay = element("delay");
   delay.max = Math.round(1e3 * Math.max(latest, latency));
   delay.value = delay.defaultValue = Math.round(1e3 * latency);
@@ -56,10 +57,10 @@ export function resetSliders() {
   showSliders();
 }
 
-/** The figures of an episode. @type {(episode: import("../flights.js").Episode, paused: boolean) => void} */
+/** The figures of an episode: of several vehicles, those of the first. @type {(episode: import("../flights.js").Episode, paused: boolean) => void} */
 export function report({ world, arrivals, outcome, verdict }, paused) {
   element("time").textContent = `${world.time.toFixed(1)} s`;
-  element("speed").textContent = `${Math.hypot(...world.vehicle.velocity).toFixed(1)} m/s`;
+  element("speed").textContent = `${Math.hypot(...world.vehicles[0].velocity).toFixed(1)} m/s`;
   element("error").textContent = outcome ? `${outcome.error.toFixed(2)} m` : "";
   element("arrivals").textContent = `${arrivals}`;
   const status = element("status");

@@ -24,6 +24,10 @@ export class Show {
   constructor(canvas, flight) {
     this.flight = flight;
     this.stage = new Stage(canvas, colours());
+    /** @type {Vehicle[]} */
+    this.vehicles = [];
+    /** @type {Trail[]} One for each vehicle. */
+    this.trails = [];
     /** @type {any} The start that is drawn. */
     this.drawn = null;
     this.paint();
@@ -33,15 +37,18 @@ export class Show {
   /** All things anew, in the colours of now. */
   paint() {
     const colour = colours();
-    for (const part of [this.vehicle?.group, this.trail?.line, this.streaks?.lines, this.course?.group]) {
+    const gone = [...this.vehicles.map((one) => one.group), ...this.trails.map((trail) => trail.line)];
+    for (const part of [...gone, this.streaks?.lines, this.course?.group]) {
       if (part) discard(part);
     }
     this.stage.paint(colour);
-    this.vehicle = new Vehicle(this.flight.courses[0].vehicle, colour);
-    this.trail = new Trail(colour);
+    const { agents, vehicle } = this.flight.courses[0];
+    this.vehicles = Array.from({ length: agents }, () => new Vehicle(vehicle, colour));
+    this.trails = this.vehicles.map(() => new Trail(colour));
     this.streaks = new Streaks(colour);
     this.course = null;
-    this.stage.scene.add(this.vehicle.group, this.trail.line, this.streaks.lines);
+    for (const [i, { group }] of this.vehicles.entries()) this.stage.scene.add(group, this.trails[i].line);
+    this.stage.scene.add(this.streaks.lines);
   }
 
   /** @param {any} world at the start of an episode: its course is drawn, and where the course is another, looked at */
@@ -52,7 +59,7 @@ export class Show {
     this.stage.scene.add(this.course.group);
     if (this.drawn?.course !== world.course) this.stage.frame(extent(world));
     this.drawn = world;
-    this.trail?.clear();
+    for (const trail of this.trails) trail.clear();
     this.stage.stale = true;
   }
 
@@ -61,9 +68,9 @@ export class Show {
     return extent(world).getSize(new THREE.Vector3()).length() > LONG;
   }
 
-  /** @param {any} world that the drawn vehicle leaves behind it */
+  /** @param {any} world that the drawn vehicles leave behind them */
   reached(world) {
-    this.trail?.add(world.vehicle.position);
+    for (const [i, trail] of this.trails.entries()) trail.add(world.vehicles[i].position);
   }
 
   /** One picture.
@@ -72,8 +79,9 @@ export class Show {
    *   what the camera does; whether anything moves but the camera */
   draw(before, world, share, { dt, wind, camera, moves }) {
     if (!this.course) this.begin(this.drawn ?? world);
-    const state = between(before.vehicle, world.vehicle, share);
-    this.vehicle?.place(state, moves ? dt : 0);
+    const states = this.vehicles.map((_, i) => between(before.vehicles[i], world.vehicles[i], share));
+    for (const [i, vehicle] of this.vehicles.entries()) vehicle.place(states[i], moves ? dt : 0);
+    const [state] = states;
     this.course?.update(world);
     const [w, x, y, z] = state.quaternion;
     const place = new THREE.Vector3(state.position[0], state.position[1], state.position[2]);
@@ -87,12 +95,12 @@ export class Show {
     if (moves || this.stage.stale) this.stage.draw(place);
   }
 
-  /** The camera goes with the vehicle, near it; or looks at the whole course again. @param {string} camera @param {any} world */
+  /** The camera goes with the first vehicle, near it; or looks at the whole course again. @param {string} camera @param {any} world */
   look(camera, world) {
     this.stage.stale = true;
     if (camera === "orbit") this.stage.frame(extent(this.drawn));
     if (camera === "follow") {
-      const [x, y, z] = world.vehicle.position;
+      const [x, y, z] = world.vehicles[0].position;
       this.stage.orbit.target.set(x, y, z);
       this.stage.camera.position.set(x - 2.2, y - 2.2, z + 1.3);
     }

@@ -13,7 +13,10 @@ loop stays on time."""
 
 
 class PoseSource(Protocol):
-    """Delivers samples as they arrive. Nothing here blocks or raises once the source is open."""
+    """Delivers samples as they arrive. Nothing here blocks or raises once the source is open.
+
+    A source of another vehicle's poses that does not see it everywhere has an attribute `range_m`: up to how far, m.
+    """
 
     @property
     def refused(self) -> int:

@@ -10,10 +10,13 @@ import numpy as np
 from e2efly.control.vectors import Array
 from e2efly.courses.gates import Gates
 from e2efly.policy.goal import Course, Observed, Outcome, Shape
-from e2efly.policy.others import Others, nobody, others_fields
+from e2efly.policy.others import Company, Others, company_of, nobody, others_fields
 from e2efly.tasks.race.goal import GatesRoute, RaceGoal
 from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.race_duel import RaceDuelConfig
+
+RACING = 20.0
+"""Speed that no racer exceeds, m/s."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,12 @@ class RaceDuelGoal(Racing):
     def neighbours(self) -> int:
         """See `RaceDuelConfig.neighbours`."""
         return self.config.neighbours
+
+    @property
+    def company(self) -> Company:
+        """The others may be anywhere on the track."""
+        gates = np.asarray(self.track.position)
+        return company_of(self.neighbours, float(np.linalg.norm(np.ptp(gates, axis=0))), RACING)
 
     def among(self, memory: RaceDuelMemory, others: Others) -> RaceDuelMemory:
         """The state with these others."""

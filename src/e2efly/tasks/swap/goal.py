@@ -13,7 +13,7 @@ from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Observed, Outcome, Shape
 from e2efly.policy.observation import Field
-from e2efly.policy.others import Others, nobody, others_fields
+from e2efly.policy.others import Company, Others, company_of, nobody, others_fields
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.swap import SwapConfig
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground
@@ -45,6 +45,12 @@ class SwapGoal(Goal):
     def neighbours(self) -> int:
         """See `SwapConfig.neighbours`."""
         return self.config.neighbours
+
+    @property
+    def company(self) -> Company:
+        """The others may be as far away as two places, and fly at more than twice the speed of the reward."""
+        c = self.config
+        return company_of(self.neighbours, math.hypot(c.side, c.side, 2 * c.height), 2.5 * float(c.speed))
 
     def among(self, memory: SwapMemory, others: Others) -> SwapMemory:
         """The state with these others."""

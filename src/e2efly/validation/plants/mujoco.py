@@ -23,80 +23,71 @@ explanation:
 
 import importlib
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 
 from e2efly.control import Quat, Vec3
+from e2efly.policy.contract import Contract
 from e2efly.validation.flight_controller import FlightController, rotor_speed_of
 from e2efly.validation.plant import EVERYTHING, MOMENT, Plant, RigidState, check_mode
+from e2efly.validation.plants.mujoco_model import STEP, world_xml
 from e2efly.validation.plants.registry import register
-from e2efly.vehicles.gravity import GRAVITY
-from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle, inertia_tensor, rotor_arms, rotor_axes, rotor_places
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle, rotor_axes, rotor_places
 from e2efly.vehicles.vehicle_rules import LEAST_VOLTAGE
 
-STEP = 1e-3
-"""Longest step of MuJoCo and of the rate loop, s."""
 HOLD = 0.00025
 """Period of the rate loop that is simulated, s."""
-FOOT = 0.005
-"""Radius of the balls under the rotors on which the vehicle stands, m."""
 _CALM = Vec3(0.0, 0.0, 0.0)
 
 
-def vehicle_xml(vehicle: Vehicle) -> str:
-    """The vehicle over a ground plane as MJCF: a free body, four rotors, four feet, the drag.
+class MujocoWorld:
+    """One model for all vehicles of a world. It advances when each has a command, or has left."""
 
-    Thrust map and drag are those at hover. `MujocoPlant` updates them in flight.
-    """
-    k2, k1, k0 = vehicle.thrust_map
-    hover, lag, ratio = vehicle.hover_rotor_speed, vehicle.motor_time_constant, vehicle.torque_ratio
-    centre = np.zeros(3) if vehicle.centre_of_mass is None else vehicle.centre_of_mass
-    dx, dy, dz = (-centre).tolist()  # the body's frame has its origin in the centre of mass
-    sites, feet, actuators = [f'<site name="centre" pos="{dx} {dy} {dz}"/>'], [], []
+    def __init__(self, plants: Sequence["MujocoPlant"], largest_step: float) -> None:
+        """Put vehicles into one model. All must be reset before the first step, of at most `largest_step` s."""
+        self.plants, self._largest_step = tuple(plants), largest_step
+        self._mujoco: Any = importlib.import_module("mujoco")  # here: the plant is known without MuJoCo
+        self.build()
 
-    axes, feet_at = rotor_axes(vehicle).tolist(), rotor_arms(vehicle).tolist()
-    rotors = zip(rotor_places(vehicle).tolist(), feet_at, axes, vehicle.rotor_spin, strict=True)
-    for i, (place, (x, y), axis, spin) in enumerate(rotors):
-        gear = " ".join(map(str, [*axis, *(float(spin) * ratio * along for along in axis)]))
-        sites.append(f'<site name="rotor_{i}" pos="{" ".join(map(str, place))}"/>')
-        feet.append(f'<geom name="foot_{i}" type="sphere" size="{FOOT}" pos="{x} {y} {FOOT - vehicle.feet_height}"/>')
-        actuators.append(
-            f'<general name="motor_{i}" site="rotor_{i}" gear="{gear}" dyntype="filter" '
-            f'dynprm="{lag}" gainprm="{2 * k2 * hover + k1}" biastype="affine" biasprm="{k0 - k2 * hover**2}"/>'
-        )
-    drags = [("drag", "{} 0 0 0", vehicle.drag_linear), ("drag_torque", "0 0 0 {}", vehicle.drag_torque)]
-    for name, gear, drag in [row for row in drags if row[2] is not None]:
-        for axis, along, size in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), drag, strict=True):
-            actuators.append(
-                f'<general name="{name}_{axis}" site="centre" gear="{gear.format(along)}" gainprm="0" '
-                f'biastype="affine" biasprm="0 0 {-size}"/>'
+    def build(self) -> None:
+        """Make the model of the present bodies. Each vehicle then knows its part of it."""
+        self.model = self._mujoco.MjModel.from_xml_string(world_xml([plant.body for plant in self.plants]))
+        self.data = self._mujoco.MjData(self.model)
+        rotor = actuator = 0
+        for i, plant in enumerate(self.plants):
+            plant.enter(self, i, rotor, actuator)
+            rotor += plant.body.rotor_count
+            actuator += plant.body.rotor_count + 3 * (1 + (plant.body.drag_torque is not None))
+
+    def placed(self) -> None:
+        """Compute what follows from the poses: the velocities from which the drag starts."""
+        self.data.qacc_warmstart[:] = 0.0
+        self._mujoco.mj_forward(self.model, self.data)
+
+    def advance(self) -> None:
+        """Hold the commands of all vehicles for their time, in equal steps. If one has yet to command, nothing happens.
+
+        Raises:
+            ValueError: for commands that are held for different times.
+        """
+        flown = [plant.asked for plant in self.plants if not plant.left]
+        if not flown or None in flown:
+            return
+        (_, dt), *rest = flown
+        if any(abs(other - dt) > MOMENT for _, other in rest):
+            raise ValueError(
+                f"the vehicles of a world hold their commands for {[each for _, each in flown]} s; accepted: one time"
             )
-    entries = inertia_tensor(vehicle)[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].tolist()
-    inertia = f'diaginertia="{" ".join(map(str, entries[:3]))}"'
-    if vehicle.inertia_products is not None:
-        inertia = f'fullinertia="{" ".join(map(str, entries))}"'
-    line = "\n      "
-    return f"""<mujoco model="{vehicle.name}">
-  <compiler inertiafromgeom="false"/>
-  <option timestep="{STEP}" integrator="RK4" gravity="0 0 -{GRAVITY}" density="0" viscosity="0">
-    <flag autoreset="disable"/>
-  </option>
-  <worldbody>
-    <light pos="0 0 10"/>
-    <geom name="ground" type="plane" size="20 20 1"/>
-    <body name="vehicle" pos="0 0 {vehicle.feet_height}">
-      <freejoint/>
-      <inertial pos="0 0 0" mass="{vehicle.mass}" {inertia}/>
-      {line.join(sites)}
-      {line.join(feet)}
-    </body>
-  </worldbody>
-  <actuator>
-      {line.join(actuators)}
-  </actuator>
-</mujoco>
-"""
+        count = math.ceil((dt - MOMENT) / self._largest_step)
+        self.model.opt.timestep = period = dt / count
+        for _ in range(count):
+            for plant in self.plants:
+                plant.drive(period)
+            self._mujoco.mj_step(self.model, self.data)
+        for plant in self.plants:
+            plant.asked = None
 
 
 @register("mujoco")
@@ -118,16 +109,41 @@ class MujocoPlant(Plant):
         check_mode(command_mode, self.name)
         if not (math.isfinite(largest_step) and largest_step > 0):
             raise ValueError(f"largest_step is {largest_step}; accepted: a positive number of seconds")
-        self._mujoco: Any = importlib.import_module("mujoco")  # here: the plant is known without MuJoCo
-        self._believed, self._mode, self._largest_step = vehicle, command_mode, largest_step
-        self.meet(vehicle)
+        self._believed, self._mode, self._map = vehicle, command_mode, vehicle.thrust_map.tolist()
+        self._met(vehicle, False)
+        MujocoWorld([self], largest_step)
         self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
+
+    @classmethod
+    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> list[Self]:
+        """Vehicles in one model, which push each other when they touch."""
+        plants = [cls.of(vehicle, contract) for _ in range(count)]
+        if count > 1:
+            MujocoWorld(plants, STEP)
+        return plants
+
+    def enter(self, world: MujocoWorld, number: int, rotor: int, actuator: int) -> None:
+        """Be vehicle `number` of a world. Its first rotor and its first actuator have these numbers there."""
+        self._world, self.model, self.data = world, world.model, world.data
+        rotors, pose, motion = self.body.rotor_count, 7 * number, 6 * number
+        motors = slice(actuator, actuator + rotors)
+        drags = slice(motors.stop, motors.stop + 3)
+        model, data = world.model, world.data
+        self._pose, self._motion = data.qpos[pose : pose + 7], data.qvel[motion : motion + 6]
+        self._applied = data.qfrc_applied[motion : motion + 6]
+        self._speed, self._told = data.act[rotor : rotor + rotors], data.ctrl[motors]
+        self._lag, self._gain = model.actuator_dynprm[motors, 0], model.actuator_gainprm[motors, 0]
+        self._offset, self._through = model.actuator_biasprm[motors, 0], data.actuator_velocity[drags]
+        self._drag = model.actuator_biasprm[drags]
+        self.asked, self.left = None, False
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
         """Fly another body from the next `reset` on, which the flight controller does not know."""
-        self.model = self._mujoco.MjModel.from_xml_string(vehicle_xml(body))
-        self.data = self._mujoco.MjData(self.model)
-        self._body = body
+        self._met(body, plain_mixer)
+        self._world.build()
+
+    def _met(self, body: Vehicle, plain_mixer: bool) -> None:
+        self.body = body
         self._controller = FlightController(self._believed.under(body, *RATE_LOOP), self._mode, plain_mixer)
         self._full_speed = body.full_rotor_speed
         self._ceiling = np.inf if body.rotor_speed_ceiling is None else body.rotor_speed_ceiling
@@ -139,68 +155,73 @@ class MujocoPlant(Plant):
     @property
     def state(self) -> RigidState:
         """The vehicle now."""
-        pose, motion = self.data.qpos.copy(), self.data.qvel.copy()  # its rotation is in the body frame
+        pose, motion = self._pose.copy(), self._motion.copy()  # its rotation is in the body frame
         return RigidState(pose[:3], motion[:3], pose[3:] / np.linalg.norm(pose[3:]), motion[3:])
 
     @property
     def rotor_speed(self) -> np.ndarray:
         """(r,) rotor speeds in the order of the vehicle file, rad/s."""
-        return self.data.act.copy()
+        return self._speed.copy()
 
     def reset(self, state: RigidState) -> None:
         """Put the vehicle into a state, with the rotors at hover speed."""
-        self._mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:] = np.concatenate([state.position, state.quaternion])
-        self.data.qvel[:] = np.concatenate([state.velocity, state.body_rate])
-        self.data.act[:] = self._body.hover_rotor_speed
-        self._wind, self._share, self._last_rate = _CALM, np.ones(self._body.rotor_count), state.body_rate
+        self._pose[:] = np.concatenate([state.position, state.quaternion])
+        self._motion[:] = np.concatenate([state.velocity, state.body_rate])
+        self._applied[:] = 0.0
+        self._speed[:] = self.body.hover_rotor_speed
+        self._wind, self._share, self._last_rate = _CALM, np.ones(self.body.rotor_count), state.body_rate
         self._controller.start(state.body_rate.tolist())
-        self._mujoco.mj_forward(self.model, self.data)  # computes the velocities from which the drag starts
+        self.asked, self.left = None, False
+        self._world.placed()
 
     def step(self, command: np.ndarray, dt: float) -> None:
-        """Hold a command for `dt` s, in equal steps."""
-        count = math.ceil((dt - MOMENT) / self._largest_step)
-        model, data, wanted = self.model, self.data, command.tolist()
-        told, (k2, k1, k0) = self._believed.thrust_map.tolist(), self._body.thrust_map.tolist()
-        linear, quadratic, share = self._body.drag_linear, self._body.drag_quadratic, self._share
-        rotors = slice(self._body.rotor_count)
-        drags = slice(rotors.stop, rotors.stop + 3)
-        for _ in range(count):
-            model.opt.timestep = dt / count
-            period, rate = dt / count, data.qvel[3:].copy()
-            coming = rate + (rate - self._last_rate) * (period - min(HOLD, period)) / (2 * period)
-            motion = [*data.qvel[:3].tolist(), *coming.tolist()]
-            thrusts = self._controller.thrusts(wanted, data.qpos.tolist(), motion, period)
-            speed = data.act.copy()
-            reached = np.minimum(rotor_speed_of(told, thrusts), self._full_speed) * self._powered(speed)
-            data.ctrl[rotors] = np.minimum(reached, self._ceiling)
-            model.actuator_dynprm[rotors, 0] = self._lags()
-            wind = self._wind if self._wind == _CALM else Quat(*data.qpos[3:].tolist()).unrotate(self._wind)
-            kept = share * self._kept(wind, speed)
-            model.actuator_gainprm[rotors, 0] = kept * (2 * k2 * speed + k1)
-            model.actuator_biasprm[rotors, 0] = kept * (k0 - k2 * speed * speed)
-            air = np.array([wind.x, wind.y, wind.z])
-            drag = linear + quadratic * np.abs(data.actuator_velocity[drags] - air)
-            model.actuator_biasprm[drags, 0] = drag * air
-            model.actuator_biasprm[drags, 2] = -drag
-            if self._body.rotor_inertia is not None:
-                data.qfrc_applied[3:] = self._rotor_torque(dt / count)
-            self._last_rate = rate
-            self._mujoco.mj_step(model, data)
+        """Hold a command for `dt` s, in equal steps. In a world of several, time passes with the last of them."""
+        self.asked = command.tolist(), dt
+        self._world.advance()
+
+    def leave(self) -> None:
+        """Stop the motors until the next `reset`. The others fly on."""
+        self.asked, self.left = None, True
+        self._world.advance()
+
+    def drive(self, period: float) -> None:
+        """Command the rotors, and set the air, for a step of MuJoCo of `period` s."""
+        rate = self._motion[3:].copy()
+        coming = rate + (rate - self._last_rate) * (period - min(HOLD, period)) / (2 * period)
+        motion = [*self._motion[:3].tolist(), *coming.tolist()]
+        thrusts = [0.0] * self.body.rotor_count
+        if self.asked is not None:
+            thrusts = self._controller.thrusts(self.asked[0], self._pose.tolist(), motion, period)
+        speed = self._speed.copy()
+        reached = np.minimum(rotor_speed_of(self._map, thrusts), self._full_speed) * self._powered(speed)
+        self._told[:] = np.minimum(reached, self._ceiling)
+        self._lag[:] = self._lags()
+        wind = self._wind if self._wind == _CALM else Quat(*self._pose[3:].tolist()).unrotate(self._wind)
+        k2, k1, k0 = self.body.thrust_map.tolist()
+        kept = self._share * self._kept(wind, speed)
+        self._gain[:] = kept * (2 * k2 * speed + k1)
+        self._offset[:] = kept * (k0 - k2 * speed * speed)
+        air = np.array([wind.x, wind.y, wind.z])
+        drag = self.body.drag_linear + self.body.drag_quadratic * np.abs(self._through - air)
+        self._drag[:, 0] = drag * air
+        self._drag[:, 2] = -drag
+        if self.body.rotor_inertia is not None:
+            self._applied[3:] = self._rotor_torque(period)
+        self._last_rate = rate
 
     def _kept(self, wind: Vec3, speed: np.ndarray) -> float | np.ndarray:
         """Share of its thrust that each rotor keeps in the air that it meets; the wind is in body axes, m/s."""
-        body, motion = self._body, self.data.qvel.tolist()
+        body, motion = self.body, self._motion.tolist()
         if body.inflow_loss is None:
             return 1.0
-        air = (Quat(*self.data.qpos[3:].tolist()).unrotate(Vec3(*motion[:3])) - wind).stack()
+        air = (Quat(*self._pose[3:].tolist()).unrotate(Vec3(*motion[:3])) - wind).stack()
         places = rotor_places(body) * [1.0, 1.0, 0.0]
         inflow = np.sum((air + np.cross(motion[3:], places)) * rotor_axes(body), axis=1)
         return np.maximum(1.0 - body.inflow_loss * inflow / np.maximum(speed, 1.0), 0.0)
 
     def _powered(self, speed: np.ndarray) -> float:
         """Speed to which the battery brings a rotor, divided by its commanded speed."""
-        body, (k2, k1, k0) = self._body, self._body.thrust_map
+        body, (k2, k1, k0) = self.body, self.body.thrust_map
         if body.battery_voltage is None:
             return 1.0
         thrust = self._share @ np.maximum((k2 * speed + k1) * speed + k0, 0.0)
@@ -213,18 +234,16 @@ class MujocoPlant(Plant):
 
         It does not change on the way, because a rotor does not pass its command.
         """
-        up, down = self._body.motor_time_constant, self._body.motor_time_constant_down
-        told = self.data.ctrl[: self._body.rotor_count]
-        return np.where(told < self.data.act, up if down is None else down, up)
+        up, down = self.body.motor_time_constant, self.body.motor_time_constant_down
+        return np.where(self._told < self._speed, up if down is None else down, up)
 
     def _rotor_torque(self, dt: float) -> np.ndarray:
         """Mean torque on the body from the angular momentum of its rotors over the next step, body axes, N*m."""
-        body, data = self._body, self.data
-        now, told, lag = data.act, data.ctrl[: body.rotor_count], self._lags()
+        body, now, told, lag = self.body, self._speed, self._told, self._lags()
         after = told + (now - told) * np.exp(-dt / lag)
         # a rotor turns against its reaction torque
         inertia = -body.rotor_inertia * body.rotor_spin * rotor_axes(body).T
         before = inertia @ now
         change = inertia @ after - before
-        middle_rate = 1.5 * data.qvel[3:] - 0.5 * self._last_rate
+        middle_rate = 1.5 * self._motion[3:] - 0.5 * self._last_rate
         return -np.cross(middle_rate, before + change / 2) - change / dt

@@ -58,11 +58,8 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
         starts: number of starts.
 
     Raises:
-        ValueError: for a task whose step computes with an operation that the page does not have, for worlds of
-            several vehicles, and for a load.
+        ValueError: for a task whose step computes with an operation that the page does not have, and for a load.
     """
-    if env.agents > 1:
-        raise ValueError(f"task.agents is {env.agents}; accepted: a task with one vehicle in a world: a page shows one")
     if env.action_size != 4:
         raise ValueError(
             f"env.command_mode is {env.physics.command_mode!r} with {env.action_size} rotors; accepted: four commands, "
@@ -70,15 +67,18 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
         )
     if env.payload is not None:
         raise ValueError(f"env.payload has mass {env.payload.mass}; accepted: 0, 0, as a page shows no load")
-    begun = beginnings(env, starts)
-    first = _row(begun, 0)
+    agents = env.agents
+    begun = beginnings(env, starts * agents)
+    worlds = [_world(begun, i, agents) for i in range(starts)]
+    first = worlds[0]
     given = named(first)
     hands = {f"hands.{name}": np.asarray(value, np.float32) for name, value in vars(Hands()).items()}
-    action = {"action": np.zeros((1, 4), np.float32)}
+    action = {"action": np.zeros((agents, 4), np.float32)}
     body = env.physics.flown
-    scenes = [_seen(env, task, _row(begun, i)) for i in range(starts)]
+    scenes = [_seen(env, task, world) for world in worlds]
     kinds = [scene for i, scene in enumerate(scenes) if scene not in scenes[:i]]
     return {
+        "agents": agents,
         "period": env.control_period,
         "latency": float(env.latency_range[0]),
         "latest": LATEST,
@@ -87,10 +87,10 @@ def course(env: Env, task: TaskConfig, starts: int = STARTS) -> dict[str, Any]:
         "step": lowered(lambda given: _step(env, _filled(first, given), given), given | hands | action),
         "starts": [
             {
-                "state": {name: packed(np.asarray(x), "<f8") for name, x in named(_row(begun, i)).items()},
-                "scene": kinds.index(scenes[i]),
+                "state": {name: packed(np.asarray(x), "<f8") for name, x in named(world).items()},
+                "scene": kinds.index(scene),
             }
-            for i in range(starts)
+            for world, scene in zip(worlds, scenes, strict=True)
         ],
         "scenes": kinds,
     }
@@ -111,14 +111,14 @@ def _filled(state: EnvState, given: Mapping[str, Array]) -> EnvState:
     return dataclasses.replace(filled, key=state.key, tick=state.tick, images=state.images, eyes=state.eyes)
 
 
-def _row(state: EnvState, i: int) -> EnvState:
-    """One vehicle of a batch, as a batch of one."""
-    one = jax.tree.map(lambda x: x[i : i + 1], dataclasses.replace(state, key=None, tick=None))
+def _world(state: EnvState, i: int, agents: int) -> EnvState:
+    """One world of a batch: the rows of its vehicles."""
+    one = jax.tree.map(lambda x: x[i * agents : (i + 1) * agents], dataclasses.replace(state, key=None, tick=None))
     return dataclasses.replace(one, key=state.key, tick=state.tick)
 
 
 def _look(env: Env, state: EnvState) -> dict[str, Array]:
-    """What the policy observes, and where it is to be."""
+    """What the policy of each vehicle observes, and where the vehicle is to be."""
     return {"observation": env._observe(state), "goal": env.task.goal(state.memory, state.time)}
 
 
@@ -139,8 +139,8 @@ def _seen(env: Env, task: TaskConfig, state: EnvState) -> dict[str, Any]:
     lines = [thing.points for thing in shown.things if isinstance(thing, Line)]
     if task.drawing() is None:
         times = jnp.linspace(0.0, jnp.asarray(env.task.episode_s), POINTS)
-        path = np.asarray(jax.vmap(lambda time: env.task.goal(state.memory, time[None])[0])(times))
-        lines += [path] if np.ptp(path, axis=0).max() > 0.01 else []
+        goals = jax.vmap(lambda time: env.task.goal(state.memory, jnp.broadcast_to(time, (env.agents,))))(times)
+        lines += [path for path in np.moveaxis(np.asarray(goals), 1, 0) if np.ptp(path, axis=0).max() > 0.01]
     return {
         "solids": [_solid(body, float(env.task.episode_s)) for body in shown.bodies],
         "lines": [plain(points) for points in lines],
