@@ -1,19 +1,20 @@
 """Whole flights and faults through the real ArduCopter, over `--link mavlink:`, in virtual time.
 
-    python benchmarks/arducopter.py --arducopter PATH [--flights 5] [--faults 5] [--json FILE]
+    python benchmarks/arducopter.py --arducopter PATH [--only NAME ...] [--count 5] [--seed 7100000] [--json FILE]
 
 PATH is ArduPilot's SITL program, which is not part of this repository; E2EFLY_ARDUCOPTER may name it, too. Our rigid
 body stands behind its JSON interface. Policies, faults and verdicts are those of `mavlink.py`, where a peer of ours
-stands in for the firmware. The version is what the firmware tells. Seeds 7100000 and following.
+stands in for the firmware. The version is what the firmware tells. Seeds 7100000 and following. `--only` flies some of
+the flights (`race`) and faults (`"the poses end"`); the rows of others stay in the file.
 """
 
 import dataclasses
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any
 
-from common import arguments, table, write
+from common import arguments, with_earlier, write
 from mavlink import POLICIES, VEHICLE
 from tests.validation.copter_bench import CopterBench
 from tests.validation.link_faults import flown
@@ -33,9 +34,11 @@ from e2efly.validation.rehearsal import LINK_S, parked, whole_course, whole_flig
 SEED = 7100000
 
 
-def flights(program: Path, count: int, seed: int) -> Iterator[dict[str, Any]]:
-    """A row for each policy."""
+def flights(program: Path, count: int, seed: int, wanted: Container[str]) -> Iterator[dict[str, Any]]:
+    """A row for each policy that is wanted."""
     for name, (policy_name, goal) in POLICIES.items():
+        if name not in wanted:
+            continue
         policy = load_policy(policy_name)
         usual: Route = route_of(policy.contract)()
         route = dataclasses.replace(usual, outside=True, **usual.whole, **goal) if goal else None
@@ -52,15 +55,17 @@ def flights(program: Path, count: int, seed: int) -> Iterator[dict[str, Any]]:
             good += flight.complete and flight.success
             told.append(flight.told if flight.complete and flight.success else f"{flight.told}: {flight.reasons}")
         yield {
-            "flight": name, "ArduCopter": f"{good} of {count}", "the last": told[-1] if told else "",
+            "flight": name, "ArduCopter": f"{good} of {count}", "the last": told[-1],
             "what failed": "; ".join(text for text in told if ": (" in text),
         }  # fmt: skip
 
 
-def faults(program: Path, count: int, seed: int) -> Iterator[dict[str, Any]]:
-    """A row for each fault."""
+def faults(program: Path, count: int, seed: int, wanted: Container[str]) -> Iterator[dict[str, Any]]:
+    """A row for each fault that is wanted."""
     settings = dataclasses.replace(rehearsal_settings(1.2), battery_unknown=False)
     for fault in FAULTS:
+        if fault.name not in wanted:
+            continue
         ends = []
         for i in range(count):
             with (
@@ -89,22 +94,22 @@ def check(program: Path) -> tuple[str, list[dict[str, Any]]]:
 
 
 def main() -> None:
-    """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", arducopter="", flights=5, faults=5, seed=SEED)
+    """Fly, print each row, write the figures after each."""
+    every = [*POLICIES, *(fault.name for fault in FAULTS)]
+    args = arguments(__doc__ or "", arducopter="", only=every, count=5, seed=SEED)
+    if unknown := set(args.only) - set(every):
+        raise SystemExit(f"--only is {unknown}; accepted: {every}")
     program = copter_program(Path(args.arducopter) if args.arducopter else None)
     prepare("cpu")
     version, checked = check(program)
-    print(version, table(checked), sep="\n", flush=True)
-    found: dict[str, list[dict[str, Any]]] = {"flights": [], "faults": []}
-    for kind, rows in (("flights", flights(program, args.flights, args.seed)),
-                       ("faults", faults(program, args.faults, args.seed))):  # fmt: skip
+    flown = (program, args.count, args.seed, args.only)
+    for part, key, rows in (("table", "flight", flights(*flown)), ("faults", "fault", faults(*flown))):
+        other = "faults" if part == "table" else "table"
         for row in rows:
             print(row, flush=True)
-            found[kind].append(row)
-        print(table(found[kind]), flush=True)
-    write("arducopter", args.json, {
-        "firmware": version, "check": checked, "table": found["flights"], "faults": found["faults"], "seed": args.seed,
-    })  # fmt: skip
+            found = {part: with_earlier("arducopter", args.json, part, (key,), [row])}
+            found[other] = with_earlier("arducopter", args.json, other, (), [])
+            write("arducopter", args.json, {"firmware": version, "check": checked, **found, "seed": args.seed})
 
 
 if __name__ == "__main__":

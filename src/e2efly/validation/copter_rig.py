@@ -3,25 +3,18 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from e2efly.flight.link import Link, open_link
+from e2efly.flight.mavlink.copter_gains import copter_gains
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.settings import FlightSettings
 from e2efly.validation.copter_sitl import DEFAULTS, CopterSitl
 from e2efly.validation.firmware_rig import FirmwareRig
-from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
+from e2efly.vehicles.vehicle import Vehicle
 from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 STEP_S = 0.001
 """Interval at which the firmware's sensors get a new state, s: shorter than its loop of 2.5 ms."""
-GYRO_FILTER_HZ = 80
-"""Low-pass of the gyro, as ArduPilot's tuning guide has it for small propellers, Hz."""
-DELAY_S = 0.004
-"""Delay of the rate by that low-pass and the loop, s. D gives back the damping that it takes."""
-INTEGRAL = 0.05
-"""I / P in units of the rate gain, for a file without `rate_integral_gain`."""
 PARAMETERS: dict[str, float] = {
     # the pilot: mode by channel 6, arming by channel 5; the modes' switch rests on a mode that holds its height
     "FLTMODE_CH": 6, "FLTMODE1": 2, "FLTMODE6": 20, "RC5_OPTION": 153, "RC7_OPTION": 0, "RC8_OPTION": 0,
@@ -32,7 +25,7 @@ PARAMETERS: dict[str, float] = {
     "ATC_ACCEL_P_MAX": 0, "ATC_ACCEL_Y_MAX": 0,
     # no satellites: a room
     "GPS1_TYPE": 0, "SIM_GPS_DISABLE": 1, "ARMING_CHECK": 1, "SIM_RC_FAIL": 1, "BATT_MONITOR": 4, "LOG_DISARMED": 0,
-    "LOG_BACKEND_TYPE": 0, "FRAME_CLASS": 1, "INS_GYRO_FILTER": GYRO_FILTER_HZ,
+    "LOG_BACKEND_TYPE": 0, "FRAME_CLASS": 1,
 }  # fmt: skip
 """Parameters of the firmware. What differs from vehicle to vehicle is in `copter_parameters`."""
 
@@ -74,31 +67,7 @@ class CopterRig(FirmwareRig[CopterSitl]):
 
 
 def copter_parameters(vehicle: Vehicle) -> dict[str, float]:
-    """The parameters with which ArduCopter's rate loop and mixer answer as a vehicle file says.
-
-    A motor output u turns a rotor at idle + u (full - idle), and ArduCopter's thrust is (1 - f) u + f u^2 of the range.
-    Its mixer gives half of a torque output of 1 to each rotor: the body accelerates by A = range/2 sum |arm| / J, and
-    P = K / A with the file's K = `rate_gain`.
-    """
-    k2, k1, _ = (float(k) for k in vehicle.thrust_map)
-    low, full = float(vehicle.rotor_speed_min), vehicle.full_rotor_speed
-    span = k2 * (full**2 - low**2) + k1 * (full - low)
-    authority = span / 2 * np.abs(allocation_matrix(vehicle)[1:]).sum(1) / vehicle.inertia
-    gain, integral = vehicle.rate_gain, vehicle.rate_integral_gain
-    slow = max(DELAY_S - (vehicle.gyro_time_constant or 0.0), 0.0)
-    rows = np.stack([gain, INTEGRAL * gain**2 if integral is None else integral, gain * slow], axis=1)
-    found = {
-        f"ATC_RAT_{axis}_{term}": float(value)
-        for axis, row in zip(("RLL", "PIT", "YAW"), rows / authority[:, None], strict=True)
-        for term, value in zip("PID", row, strict=True)
-    }
-    filters = {
-        f"ATC_RAT_{axis}_FLT{which}": hz
-        for axis in ("RLL", "PIT", "YAW")
-        for which, hz in (("T", 0.0), ("E", 0.0), ("D", GYRO_FILTER_HZ / 2))
-    }
-    return found | filters | {
-        "FRAME_TYPE": 12 if vehicle.rotor_spin[0] > 0 else 18,  # Betaflight's order of motors, and reversed
-        "MOT_SPIN_ARM": low / full, "MOT_SPIN_MIN": low / full, "MOT_SPIN_MAX": 1.0,
-        "MOT_THST_EXPO": k2 * (full - low) ** 2 / span, "MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000,
-    }  # fmt: skip
+    """The parameters of a vehicle: its rate loop, and its motors in Betaflight's order of outputs."""
+    gains = copter_gains(vehicle)
+    turned = {"FRAME_TYPE": 12 if vehicle.rotor_spin[0] > 0 else 18}  # BetaFlightX, and with reversed rotors
+    return gains | turned | {"MOT_SPIN_ARM": gains["MOT_SPIN_MIN"], "MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}
