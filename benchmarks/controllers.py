@@ -29,9 +29,10 @@ from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController, Seen, UnderWay, hover_controller, sent, thrust_of
 from e2efly.validation import firmware_program
 from e2efly.validation.bridge_session import Session, rehearsal_settings
+from e2efly.validation.firmware_rig import POSE_NOISE
 from e2efly.validation.plant import Delay, RigidState
 from e2efly.validation.plant_flight import imu_of
-from e2efly.validation.rig import POSE_NOISE, Rig
+from e2efly.validation.rig import Rig
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle

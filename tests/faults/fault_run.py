@@ -8,7 +8,7 @@ from typing import Any
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
-from e2efly.validation.rig import STEP_S
+from e2efly.validation.firmware_rig import STEP_S
 from tests.faults.faults import End, Fault
 from tests.faults.stage import FENCE, Stage, Trace
 

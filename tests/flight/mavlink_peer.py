@@ -30,7 +30,8 @@ PX4_VALUES = {
 }  # fmt: skip
 PX4_REALS = {"COM_OF_LOSS_T", "THR_MDL_FAC", "COM_DISARM_LAND", *(f"RC{n}_REV" for n in range(1, 5))}
 COPTER_VALUES = {
-    "GUID_OPTIONS": 8, "GUID_TIMEOUT": 0.3, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2.0, "FS_THR_ENABLE": 3,
+    "GUID_OPTIONS": 9, "RC_OPTIONS": 0, "ATC_RATE_FF_ENAB": 1,
+    "GUID_TIMEOUT": 0.3, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2.0, "FS_THR_ENABLE": 3,
     "FS_OPTIONS": 0, "ATC_ANGLE_BOOST": 0, "PILOT_THR_FILT": 0, "MOT_THST_EXPO": 0.65, "MOT_BAT_VOLT_MAX": 0,
     "ATC_ACCEL_R_MAX": 0, "ATC_ACCEL_P_MAX": 0, "ATC_ACCEL_Y_MAX": 0, "RCMAP_ROLL": 1, "RCMAP_PITCH": 2,
     "RCMAP_THROTTLE": 3, "RCMAP_YAW": 4, "SYSID_MYGCS": 255, "VISO_TYPE": 0, "RC1_REVERSED": 0, "RC2_REVERSED": 0,
@@ -115,7 +116,7 @@ class MavlinkRig(FlownPeer):
         manual = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
         if received and self.hand.armed is not self._arm and (self.hand.armed or self.standing):  # moved, not held
             self._arm = self.hand.armed
-            if self.armed is not self._arm:
+            if self.armed is not self._arm and (self.armed or self._arms):
                 self.armed = self._arm
                 self.log.append("armed" if self.armed else "disarmed")
         if received and self.hand.override is not self.received:
@@ -137,6 +138,13 @@ class MavlinkRig(FlownPeer):
         if self.mode == land and self.standing and self.time - self._landing > 1.0 and self.armed:
             self.armed = False
             self.log.append("disarmed")
+
+    @property
+    def _arms(self) -> bool:
+        """Whether the transmitter may arm it now: ArduCopter 4.6.3 asks two options."""
+        guided, receiver = (int(self.values.get(name, 0)) for name in ("GUID_OPTIONS", "RC_OPTIONS"))
+        allowed = self.mode != GUIDED_NOGPS or bool(guided & 1)
+        return self.px4 or (allowed and not (receiver & 32 and self.hand.throttle > -1))
 
     def _to(self, mode: int, *, critical: bool) -> None:
         if mode != self.mode:

@@ -16,6 +16,7 @@ from e2efly.commands.fly import Fly
 from e2efly.commands.fly import run as fly_command
 from e2efly.flight.autopilots import open_autopilot
 from e2efly.flight.link import open_link
+from e2efly.flight.mavlink.copter_gains import NAMES, copter_gains, gain_rows
 from e2efly.flight.mavlink.dialect import ARDUPILOT, PX4, MavlinkDialect, dialect_of, release_row
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import hover_controller
@@ -35,7 +36,8 @@ SETTINGS = dataclasses.replace(rehearsal_settings(1.2), battery_unknown=False)
 WRONG = {
     "COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0, "NAV_RCL_ACT": 2, "COM_RCL_EXCEPT": 4, "COM_RC_IN_MODE": 4,
     "MAV_FWDEXTSP": 0, "MC_AIRMODE": 0, "MC_BAT_SCALE_EN": 1, "THR_MDL_FAC": 1.5, "BAT1_N_CELLS": 0,
-    "GUID_OPTIONS": 0, "GUID_TIMEOUT": 3.0, "FS_GCS_ENABLE": 0, "FS_GCS_TIMEOUT": 10.0, "FS_THR_ENABLE": 1,
+    "GUID_OPTIONS": 8, "ATC_RATE_FF_ENAB": 0, "GUID_TIMEOUT": 3.0,
+    "FS_GCS_ENABLE": 0, "FS_GCS_TIMEOUT": 10.0, "FS_THR_ENABLE": 1,
     "FS_OPTIONS": 4, "ATC_ANGLE_BOOST": 1, "PILOT_THR_FILT": 1.0, "MOT_THST_EXPO": -0.5, "MOT_BAT_VOLT_MAX": 16.8,
     "ATC_ACCEL_R_MAX": 1100, "ATC_ACCEL_P_MAX": 1100, "ATC_ACCEL_Y_MAX": 270,
 }  # fmt: skip
@@ -117,6 +119,37 @@ def test_each_parameter_that_would_harm_is_named_with_its_line(
             assert need.row(values | {need.name: float(need.mend)}).good
         missing = need.row({name: value for name, value in values.items() if name != need.name})
         assert missing.good is need.optional and "not told" in missing.value
+
+
+@pytest.mark.parametrize("values", [{"GUID_OPTIONS": 8}, {"RC_OPTIONS": 32}])
+def test_arducopter_is_armed_in_its_mode_only_if_two_options_allow_it(values: dict[str, float]) -> None:
+    """As ArduCopter 4.6.3 did; with RC_OPTIONS 32, the throttle stick has to be low."""
+    rig = MavlinkRig("copter", VEHICLE, latency=0.02, values=values)
+    session = Session(rig, SETTINGS, hover=hover_controller("geometric", VEHICLE, 0.03))
+    rig.set(override=True)
+    session.fly(0.3)
+    rig.set(armed=True)
+    session.fly(0.5)
+    assert not rig.armed
+    rig.set(armed=False, throttle=-1.0)
+    session.fly(0.3)
+    rig.set(armed=True)
+    session.fly(0.5)
+    assert rig.armed is ("RC_OPTIONS" in values)
+
+
+def test_what_its_estimator_and_its_rate_loop_lack_is_shown_and_forbids_nothing() -> None:
+    told = dict(COPTER_VALUES) | copter_gains(VEHICLE)
+    rows = gain_rows(VEHICLE, told)
+    assert set(copter_gains(VEHICLE)) == set(NAMES)
+    assert all(row.good and row.told for row in rows)
+    slow = {row.setting: row for row in gain_rows(VEHICLE, told | {"ATC_RAT_PIT_P": 0.135, "INS_GYRO_FILTER": 20})}
+    look = [name for name, row in slow.items() if not row.told]
+    assert look == ["ATC_RAT_PIT_P, ATC_RAT_PIT_I, ATC_RAT_PIT_D", "INS_GYRO_FILTER"]
+    assert slow["INS_GYRO_FILTER"].mend == ("param set INS_GYRO_FILTER 80",) and problems(slow.values()) == ()
+    row = ARDUPILOT.poses_row(told | {"VISO_TYPE": 1, "EK3_SRC1_POSXY": 6, "EK3_SRC1_VELXY": 6, "EK3_SRC1_YAW": 1})
+    assert row.good and not row.told and row.mend[-1] == "param set EK3_SRC1_YAW 6" and len(row.mend) == 3
+    assert PX4.poses_row(PX4_VALUES).told and "drifts" in ARDUPILOT.poses_row(told).value
 
 
 def test_unknown_versions_and_autopilots_are_refused_by_name(rig: MavlinkRig) -> None:

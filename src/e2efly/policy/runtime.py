@@ -21,8 +21,8 @@ from e2efly.policy.others import USUAL, Others
 from e2efly.vehicles.vehicle import Vehicle
 
 MODES = tuple(name for name, mode in COMMAND_MODES.items() if mode.controller is not None)
-"""Command modes that are converted to collective thrust and body rates. A flight controller accepts no rotor
-thrusts."""
+"""Command modes that are converted to collective thrust and body rates. No link takes rotor thrusts in flight:
+docs/onboard.md says why of each autopilot."""
 _ROUNDING = 1e-6
 """Rounding tolerance of the clock, in periods."""
 
@@ -197,7 +197,8 @@ def check(
     if contract.action.mode not in MODES and not rotors:
         reasons.append(
             f"action.mode of the policy is {contract.action.mode!r}; accepted: {' or '.join(map(repr, MODES))}, "
-            "which become collective thrust and body rates"
+            "which become collective thrust and body rates. No link takes commands of rotors in flight; on board, they "
+            "fly by `e2efly export --raptor` (PX4) or `--c`"
         )
     for image in contract.images if not images else ():
         reasons.append(f"{image.lacking}; accepted: a policy without images (from Python, `Policy.act` takes them)")

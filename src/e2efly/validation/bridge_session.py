@@ -57,7 +57,7 @@ class FlightBench(Protocol):
         ...
 
     def set(self, **changes: Any) -> None:
-        """Move the pilot's sticks and switches: fields of `rig.Transmitter`."""
+        """Move the pilot's sticks and switches: fields of `firmware_rig.Transmitter`."""
         ...
 
     def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Autopilot:

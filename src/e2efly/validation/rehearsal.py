@@ -23,6 +23,7 @@ from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
+from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.vehicle import Vehicle
 
 PARKED = 0.3
@@ -127,12 +128,9 @@ def whole_flight(
     fence: Fence | None,
 ) -> Rehearsal:  # fmt: skip
     """One whole flight on a bench, from the ground to the ground; see `rehearse`. The latency is the bench's."""
-    random = np.random.default_rng(seed)
-    first = course.origin.points(course.start)
-    x, y = first[:2] + random.uniform(-PARKED, PARKED, 2)
-    rig.state = rig.world.at_rest(x, y, _heading(course, random))
+    rig.state = parked(rig.world, course, seed)
     rig.sleep(0.5)
-    height = first[2] - rig.world.vehicle.feet_height
+    height = course.origin.points(course.start)[2] - rig.world.vehicle.feet_height
     wide = open_fence(rig.world.vehicle, REACH_IN_SIGHT if cameras else REACH)
     settings = rehearsal_settings(height, fence=fence or wide)
     hover = hover_controller(HOVER, rig.world.vehicle, rig.latency + LINK_S)
@@ -162,6 +160,13 @@ def whole_flight(
         return dataclasses.replace(flight, complete=False, told=f"{flight.told}, touched the ground")
     finally:
         session.close()
+
+
+def parked(world: World, course: Course, seed: int) -> FlownBody:
+    """Where a whole flight begins: on the ground near the start of the policy's course."""
+    random = np.random.default_rng(seed)
+    x, y = course.origin.points(course.start)[:2] + random.uniform(-PARKED, PARKED, 2)
+    return world.at_rest(x, y, _heading(course, random))
 
 
 def _touched(flown: FlownSession, feet: float) -> bool:

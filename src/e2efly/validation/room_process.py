@@ -27,7 +27,8 @@ import numpy as np
 from e2efly.flight.process import be_punctual
 from e2efly.policy.odometry import tilt_of, yaw_of
 from e2efly.validation.firmware_program import chosen
-from e2efly.validation.rig import POSE_NOISE, Rig, Transmitter
+from e2efly.validation.firmware_rig import POSE_NOISE, Transmitter
+from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
 
 ROUND_S = 0.004

@@ -8,7 +8,9 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from e2efly.flight.mavlink.copter_gains import NAMES, gain_rows
 from e2efly.flight.row import Row
+from e2efly.vehicles.vehicle import Vehicle
 
 LAND_S = 0.5
 """The autopilot must notice within this time that commands have ended, s."""
@@ -69,15 +71,39 @@ class MavlinkDialect:
     ground_station: str
     """Parameter with the system id whose heartbeats count for the loss of the link. Empty: any system's do."""
     passes_poses: tuple[str, ...]
-    """Parameters that make its estimator take poses, if one of them is not 0."""
+    """Parameters that make it take poses, if one of them is not 0."""
+    fuses: Mapping[str, float]
+    """Parameters, and their values, with which its estimator uses poses that it takes."""
     cells: str
     """Parameter with the number of the battery's cells. Empty: there is none."""
+    tuned: tuple[str, ...] = ()
+    """Parameters of its rate loop and mixer ..."""
+    tuned_rows: Callable[[Vehicle, Parameters], tuple[Row, ...]] = lambda vehicle, told: ()
+    """... and the rows that show them beside those of a vehicle file."""
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """All parameters that are read."""
-        others = (self.curve, *self.sticks, self.ground_station, *self.passes_poses, self.cells)
+        others = (
+            self.curve,
+            *self.sticks,
+            self.ground_station,
+            *self.passes_poses,
+            *self.fuses,
+            self.cells,
+            *self.tuned,
+        )
         return tuple(dict.fromkeys((*(need.name for need in self.needs), *filter(None, others))))
+
+    def poses_row(self, told: Parameters) -> Row:
+        """What becomes of the poses, as a row of the table. Nothing of it forbids a flight."""
+        taken = [f"{name} {told[name]:g}" for name in self.passes_poses if told.get(name)]
+        if not taken:
+            value = f"{', '.join(self.passes_poses)} 0: its estimator gets no poses, and its own landing drifts"
+            return Row("poses", value, "any", True)
+        unused = tuple(f"param set {name} {value:g}" for name, value in self.fuses.items() if told.get(name) != value)
+        value = f"{', '.join(taken)}: they are passed on" + (", and its estimator does not use all" if unused else "")
+        return Row("poses", value, "any", True, unused, told=not unused)
 
     def value(self, raw: bytes, kind: int) -> float:
         """The value of a parameter: 4 bytes, and its type as MAV_PARAM_TYPE."""
@@ -133,6 +159,7 @@ PX4 = MavlinkDialect(
     forward=1,
     ground_station="",
     passes_poses=("EKF2_EV_CTRL",),
+    fuses={},
     cells="BAT1_N_CELLS",
 )  # fmt: skip
 _GCS_LOSS = {
@@ -152,7 +179,10 @@ ARDUPILOT = MavlinkDialect(
     mode_name="GUIDED_NOGPS",
     releases=((4, 4), (4, 5), (4, 6)),
     needs=(
-        Needed("GUID_OPTIONS", lambda bits: bool(int(bits) & 8), "with bit 3 (8): thrust, not a climb rate", "8"),
+        Needed("GUID_OPTIONS", lambda bits: int(bits) & 9 == 9, "with bits 0 and 3 (9): the transmitter arms it in "
+               "this mode, and thrust is not a climb rate", "9"),
+        Needed("RC_OPTIONS", lambda bits: True, "any: with bit 5 (32) it arms only with the throttle stick low. Lift "
+               "it to the middle before the hover"),
         Needed("GUID_TIMEOUT", lambda s: 0 < s <= LAND_S, f"at most {LAND_S:g} s: for so long it holds the last "
                "command when this program dies; then it is level and keeps its height", "0.3"),
         Needed("FS_GCS_ENABLE", _among(5), "5, Land: what it does when this program's heartbeats end", "5",
@@ -168,6 +198,7 @@ ARDUPILOT = MavlinkDialect(
         Needed("MOT_THST_EXPO", lambda f: 0 <= f <= 1, "any from 0 to 1: its curve is inverted", "0.65"),
         Needed("MOT_BAT_VOLT_MAX", _among(0), "0: the throttle map follows the battery itself", "0"),
         *(Needed(f"ATC_ACCEL_{axis}_MAX", _among(0), "0: or body rates are reached slowly", "0") for axis in "RPY"),
+        Needed("ATC_RATE_FF_ENAB", _among(1), "1: or body rates only turn the attitude that it holds", "1"),
     ),
     integers_bytewise=False,
     curve="MOT_THST_EXPO",
@@ -177,7 +208,10 @@ ARDUPILOT = MavlinkDialect(
     forward=-1,
     ground_station="SYSID_MYGCS",
     passes_poses=("VISO_TYPE",),
+    fuses=dict.fromkeys((f"EK3_SRC1_{what}" for what in ("POSXY", "VELXY", "POSZ", "VELZ", "YAW")), 6),
     cells="",
+    tuned=NAMES,
+    tuned_rows=gain_rows,
 )  # fmt: skip
 DIALECTS = (PX4, ARDUPILOT)
 

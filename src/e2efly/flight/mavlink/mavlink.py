@@ -138,19 +138,14 @@ class Mavlink:
 
     def check(self, vehicle: Vehicle, settings: FlightSettings, contract: Contract | None) -> tuple[Row, ...]:
         """The parameters that matter to a flight, and what the autopilot does when link, poses or this program end."""
-        del vehicle, settings, contract
+        del settings, contract
         dialect, told = self.dialect, self.parameters
-        poses = [name for name in dialect.passes_poses if told.get(name)]
-        passed = (
-            f"{', '.join(f'{name} {told[name]:g}' for name in poses)}: the poses are passed on to its estimator"
-            if poses
-            else f"{', '.join(dialect.passes_poses)} 0: its estimator gets no poses, and its own landing drifts"
-        )
         return (
             release_row(dialect, self.version),
             Row("mode", dialect.mode_name, "a position of the pilot's mode switch: it alone hands over", True),
             *(need.row(told) for need in dialect.needs),
-            Row("poses", passed, "any", True),
+            *dialect.tuned_rows(vehicle, told),
+            dialect.poses_row(told),
         )
 
     def poll(self, now: float) -> None:
