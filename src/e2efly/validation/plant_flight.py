@@ -4,11 +4,13 @@ import dataclasses
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.policy.goal import Body
+from e2efly.policy.odometry import Odometry
 from e2efly.policy.others import Others, nobody
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.law_step import LawMemory, LawStep, air_of, arrived, observed
@@ -68,6 +70,23 @@ class Trajectory:
     """Moments between control steps, if they were requested."""
 
 
+class FlownPose(Protocol):
+    """Where a vehicle on a plant believes to be."""
+
+    @property
+    def interval(self) -> float:
+        """Longest time between two of its steps, s."""
+        ...
+
+    def step(self, after: RigidState, now: float) -> None:
+        """Sense the motion from the last step to the state `after`, at `now`, s since the start."""
+        ...
+
+    def odometry(self, now: float) -> Odometry:
+        """What the vehicle is told of its motion."""
+        ...
+
+
 Flying = Generator[RigidState, Sequence[RigidState], Trajectory]
 """A flight, step by step."""
 
@@ -101,6 +120,7 @@ def flying(
     sample: float | None = None,
     images: Callable[[int, Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
     law: LawStep | None = None,
+    pose: "FlownPose | None" = None,
 ) -> Flying:
     """Fly from one start until the time is over, or the task is done or has failed.
 
@@ -117,6 +137,7 @@ def flying(
         sample: longest time between two samples, s. None: no samples are kept.
         images: the cameras' images, by control step and the states until then (`plant_sight.Watch.images`).
         law: the control steps of the flight under a law of the stress.
+        pose: tells the policy where it is. None: it is told the truth.
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
@@ -143,9 +164,10 @@ def flying(
         try:
             truth = states[-1].odometry(now)
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
-            seen = None if air is None else air.seen(k, truth)
+            told = truth if pose is None else pose.odometry(now)
+            seen = (None if pose is None else told) if air is None else air.seen(k, told)
             if law is not None and felt is not None:
-                seen, felt = observed(law.at(k), felt, truth if seen is None else seen, period)
+                seen, felt = observed(law.at(k), felt, told if seen is None else seen, period)
                 measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
             shown = () if images is None else images(k, states)
             others = nearest(states[-1], rest, runtime.course.goal.neighbours) if rest else None
@@ -164,12 +186,15 @@ def flying(
                 plant.disturb(air.wind[k], air.rotor_share[k])
             at = now
             for acting, seconds in parts:
-                count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
+                longest = min(seconds if sample is None else sample, seconds if pose is None else pose.interval)
+                count = max(math.ceil(seconds / longest - 1e-6), 1)
                 for _ in range(count):
                     plant.step(acting, seconds / count)
                     at += seconds / count
                     if sample is not None:
                         samples.append(FlightSample.of(plant, at))
+                    if pose is not None:
+                        pose.step(RigidState.of(plant.state), at)
             reached = RigidState.of(plant.state)
         except (ValueError, OSError) as error:
             fault = f"after {now:.2f} s: {error}"
