@@ -6,7 +6,9 @@ estimator is the one that flies. Imports JAX.
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,16 +19,19 @@ from e2efly.config import CameraConfig, ImuConfig
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import RaceTrack
 from e2efly.flight.pose.gates.error_state import ErrorState, SensorNoise, quaternion_of, rotation_of, turned
-from e2efly.flight.pose.gates.gate_corners import gate_corners
+from e2efly.flight.pose.gates.gate_corners import Corners, gate_corners
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
+from e2efly.flight.pose.gates.gate_setup import GateSetup
+from e2efly.flight.pose.gates.gate_source import GateSource
 from e2efly.flight.pose.gates.lens import Lens, Openings
 from e2efly.policy.goal import Course
-from e2efly.policy.odometry import Odometry
+from e2efly.policy.odometry import Odometry, Sample
 from e2efly.simulation.scenes import camera
 from e2efly.simulation.scenes.camera import Mount
 from e2efly.simulation.scenes.course import HALF_DEPTH, frames
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.simulation.sensors import eyes  # registers cameras as pytrees
+from e2efly.validation.bridge_session import FlightBench
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import imu_of
 
@@ -38,6 +43,8 @@ RACER = CameraConfig(
 """The camera of a racer: tilted up by 20 degrees, mounted within 2 degrees, its images 20 to 60 ms old."""
 BANDS = 12
 """Bands of rows that a rolling shutter exposes one after the other."""
+KEPT_S = 0.2
+"""How long the states of a vehicle are kept, s. Its images are younger."""
 
 
 @dataclass(frozen=True)
@@ -93,26 +100,83 @@ def track_of(course: Course) -> RaceTrack:
 
 
 @dataclass
-class GatePose:
-    """The pose source of one flight."""
+class GateEyes:
+    """The camera of one flight, with all that is drawn for it."""
 
     setup: GateCamera
+    known: RaceTrack
+    """The map of the gates."""
     scene: Scene
-    """The world: gates where they stand, n copies."""
+    """The gates where they stand: a copy of the world for each band of rows."""
     mount: Mount
-    """The camera as it is mounted: a leaf row for each band of rows."""
+    """The camera as it is mounted: a row of the leaves for each band of rows."""
     latency: float
     """Age of the images, s."""
-    estimator: GateEstimator
     random: np.random.Generator
-    bias: tuple[np.ndarray, np.ndarray]
-    """(3,) of gyroscope and accelerometer."""
-    error: list[float] = field(default_factory=list)
-    """Distance of the estimate from the vehicle after each sample of the IMU, m."""
+    problem: None = None
     _past: list[tuple[float, RigidState]] = field(default_factory=list)
     _coming: list[tuple[float, float]] = field(default_factory=list)
     """Arrival and exposure of the images that are exposed, s."""
-    _next: float = 0.0
+    _next: float = -math.inf
+
+    @staticmethod
+    def of(setup: GateCamera, known: RaceTrack, seed: int) -> "GateEyes":
+        """Draw the gates' places, the mounting and the age of the images."""
+        random, c = np.random.default_rng(seed), setup.camera
+        shift = setup.survey * random.standard_normal(known.position.shape)
+        real = dataclasses.replace(known, position=known.position + shift)
+        scene = Scene.of({"gate": frames(Gates.of(real), BANDS)}, BANDS)
+        u = random.uniform(-1, 1, (1, 8))
+        angles, offset = (jnp.asarray(x, jnp.float32) for x in (c.angle_spread * u[:, :3], c.position_spread * u[:, 5:]))
+        whole = camera.mounted(c, angles, jnp.asarray(1 + c.fov_spread * u[:, 3:4], jnp.float32), offset)
+        return GateEyes(setup, known, scene, banded(whole), float(random.uniform(*c.latency)), random)
+
+    def see(self, now: float, state: RigidState) -> list[tuple[float, Corners]]:
+        """The corners in the images that arrive until `now`, s, with the stamps of the images, s.
+
+        It must be called often: the vehicle moves evenly from one state to the next.
+        """
+        setup = self.setup
+        self._past.append((now, state))
+        if now >= self._next:
+            self._next = max(self._next, now) + 1 / (setup.camera.rate or 30.0) - 1e-9
+            if self.random.uniform() >= setup.lost:
+                self._coming.append((now + max(self.latency, setup.readout / 2), now))
+        found = []
+        while self._coming and self._coming[0][0] <= now:
+            came, exposed = self._coming.pop(0)
+            found.append((came - float(np.mean(setup.camera.latency)), gate_corners(self._image(exposed))))
+        while self._past[0][0] < now - KEPT_S:
+            self._past.pop(0)
+        return found
+
+    def _image(self, exposed: float) -> np.ndarray:
+        """The mask whose middle row was exposed at a time, s, each band of rows at its own."""
+        times = exposed + self.setup.readout * ((np.arange(BANDS) + 0.5) / BANDS - 0.5)
+        stamps = np.array([time for time, _ in self._past])
+        near = [(time, *self._past[int(np.argmin(np.abs(stamps - time)))]) for time in times]
+        position = np.array([s.position + (time - at) * s.velocity for time, at, s in near])
+        turns = [
+            quaternion_of(rotation_of(s.quaternion) @ turned((time - at) * s.body_rate)) for time, at, s in near
+        ]
+        c = self.setup.camera
+        band = dataclasses.replace(c, height=c.height // BANDS)
+        rows = _look(band, self.scene, self.mount, position.astype(np.float32), np.array(turns, np.float32))
+        return np.asarray(rows).reshape(c.height, c.width)
+
+
+@dataclass
+class GatePose:
+    """The pose source of one flight on a plant: an estimator with the images of `eyes` and an IMU of its own."""
+
+    eyes: GateEyes
+    estimator: GateEstimator
+    bias: tuple[np.ndarray, np.ndarray]
+    """(3,) of gyroscope, rad/s, and accelerometer, m/s^2."""
+    last: tuple[float, RigidState]
+    """Time, s since the start, and state of the last step."""
+    error: list[float] = field(default_factory=list)
+    """Distance of the estimate from the vehicle after each sample of the IMU, m."""
 
     @staticmethod
     def of(setup: GateCamera, course: Course, start: RigidState, seed: int) -> "GatePose":
@@ -121,73 +185,94 @@ class GatePose:
         Raises:
             ValueError: as for `track_of`.
         """
-        random, c = np.random.default_rng(seed), setup.camera
-        known = track_of(course)
-        real = dataclasses.replace(
-            known, position=known.position + setup.survey * random.standard_normal(known.position.shape)
-        )
-        scene = Scene.of({"gate": frames(Gates.of(real), BANDS)}, BANDS)
-        u = random.uniform(-1, 1, 8)
-        angles, offset = c.angle_spread * u[:3], c.position_spread * u[5:]
-        whole = camera.mounted(c, jnp.asarray(angles[None]), jnp.asarray(1 + c.fov_spread * u[None, 3:4]), offset[None])
-        rotation = rotation_of(start.quaternion)
-        place, _, turn = setup.noise.start
+        eyes = GateEyes.of(setup, track_of(course), seed)
+        draw, noise = eyes.random.standard_normal, setup.noise
+        place, _, turn = noise.start
         state = ErrorState.at(
-            0.0, start.position + place / 2 * random.standard_normal(3),
-            rotation @ turned(turn / 2 * random.standard_normal(3)), setup.noise,
+            0.0, start.position + place / 2 * draw(3),
+            rotation_of(start.quaternion) @ turned(turn / 2 * draw(3)), noise,
         )  # fmt: skip
         state = dataclasses.replace(state, velocity=start.velocity.copy(), body_rate=start.body_rate.copy())
-        bias = setup.bias[0] * random.standard_normal(3), setup.bias[1] * random.standard_normal(3)
-        estimator = GateEstimator(state, setup.lens, Openings.of(known, HALF_DEPTH), setup.noise)
-        latency = float(random.uniform(*c.latency))
-        return GatePose(setup, scene, banded(whole), latency, estimator, random, bias, _past=[(0.0, start)])
+        estimator = GateEstimator(state, setup.lens, Openings.of(eyes.known, HALF_DEPTH), noise)
+        return GatePose(eyes, estimator, (setup.bias[0] * draw(3), setup.bias[1] * draw(3)), (0.0, start))
 
     @property
     def interval(self) -> float:
         """Longest time between two samples of the IMU, s."""
-        return 1 / self.setup.imu_rate
+        return 1 / self.eyes.setup.imu_rate
 
     def step(self, after: RigidState, now: float) -> None:
         """Feel and see the motion from the last step to the state `after`, at `now`, s since the start."""
-        before, dt = self._past[-1][1], now - self._past[-1][0]
-        setup, imu = self.setup, self.setup.imu
-        felt = imu_of(before, after, dt)
-        white = self.random.standard_normal((2, 3)) / math.sqrt(dt)
+        (then, before), setup = self.last, self.eyes.setup
+        dt, imu = now - then, setup.imu
+        felt, white = imu_of(before, after, dt), self.eyes.random.standard_normal((2, 3)) / math.sqrt(dt)
         self.estimator.feel(InertialSample(
             now, felt.gyroscope + self.bias[0] + imu.gyro_noise * white[0],
             felt.accelerometer + self.bias[1] + imu.accel_noise * white[1],
         ))  # fmt: skip
-        self._past.append((now, after))
-        if now >= self._next:
-            self._next += 1 / (setup.camera.rate or 30.0)
-            if self.random.uniform() >= setup.lost:
-                self._coming.append((now + max(self.latency, setup.readout / 2), now))
-        while self._coming and self._coming[0][0] <= now:
-            came, exposed = self._coming.pop(0)
-            stamp = came - float(np.mean(setup.camera.latency))
-            self.estimator.look(gate_corners(self._image(exposed)), stamp)
-        while self._past[0][0] < now - 0.2:
-            self._past.pop(0)
+        self.last = now, after
+        for stamp, corners in self.eyes.see(now, after):
+            self.estimator.look(corners, stamp)
         self.error.append(float(np.linalg.norm(self.estimator.state.position - after.position)))
 
     def odometry(self, now: float) -> Odometry:
         """What the vehicle is told of itself."""
         return self.estimator.odometry(now)
 
-    def _image(self, exposed: float) -> np.ndarray:
-        """The mask whose middle row was exposed at a time, s, each band of rows at its own."""
-        times = exposed + self.setup.readout * ((np.arange(BANDS) + 0.5) / BANDS - 0.5)
-        stamps = np.array([time for time, _ in self._past])
-        nearest = [self._past[int(np.argmin(np.abs(stamps - time)))] for time in times]
-        position = np.array([s.position + (t - at) * s.velocity for t, (at, s) in zip(times, nearest, strict=True)])
-        turns = [
-            quaternion_of(rotation_of(s.quaternion) @ turned((t - at) * s.body_rate))
-            for t, (at, s) in zip(times, nearest, strict=True)
-        ]
-        c = self.setup.camera
-        band = dataclasses.replace(c, height=c.height // BANDS)
-        rows = _look(band, self.scene, self.mount, position.astype(np.float32), np.array(turns, np.float32))
-        return np.asarray(rows).reshape(c.height, c.width)
+
+@dataclass
+class RigLooks:
+    """The camera of a flight on a bench, whose true state is `state()`, in a room in which the course has its place."""
+
+    eyes: GateEyes
+    state: Callable[[], Any]
+    problem: None = None
+
+    def read(self, now: float) -> list[tuple[float, Corners]]:
+        """See `gate_source.Looks`."""
+        return self.eyes.see(now, RigidState.of(self.state()))
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def describe(self) -> str:
+        """The camera."""
+        camera = self.eyes.setup.camera
+        return f"a rendered mask, {camera.width} x {camera.height} pixels, {camera.rate:g} Hz"
+
+
+class LatePoses(GateSource):
+    """Poses that are told a latency after they were true, as the policy was trained for."""
+
+    latency: float = 0.0
+    """s."""
+
+    def read(self, now: float) -> list[Sample]:
+        """The poses of a latency ago, and older ones that have not been told."""
+        self._waiting.extend(super().read(now))
+        ready = [s for s in self._waiting if s.stamp is not None and s.stamp + self.latency <= now]
+        self._waiting = self._waiting[len(ready) :]
+        return [dataclasses.replace(sample, received=now) for sample in ready]
+
+    _waiting: list[Sample]
+
+
+def gate_poses(rig: FlightBench, setup: GateCamera, course: Course, seed: int) -> GateSource:
+    """The pose source of a whole flight on a bench, put down at the start of its course.
+
+    Raises:
+        ValueError: as for `track_of`.
+    """
+    known, origin = track_of(course), course.origin
+    track = dataclasses.replace(known, position=origin.points(known.position), yaw=known.yaw + origin.yaw)
+    x, y = origin.points(course.start)[:2]
+    heading = known.start_yaw if course.heading is None else course.heading
+    start = np.array([x, y, rig.world.vehicle.feet_height, heading + origin.yaw])
+    c = setup.camera
+    told = GateSetup(track, start, setup.lens, c.rate or 30.0, float(np.mean(c.latency)), setup.noise)
+    source = LatePoses(told, RigLooks(GateEyes.of(setup, track, seed), lambda: rig.state))
+    source.latency, source._waiting = rig.latency, []
+    return source
 
 
 @jax.jit

@@ -33,6 +33,9 @@ PASSES = 2
 DOUBT = 1.15
 """Factor on the standard deviations of the pose after an image in which corners were found and none was expected where
 it is."""
+STILL = 0.02
+"""Standard deviation of velocity, m/s, and body rate, rad/s, of a vehicle that stands, and of what its sensors say of
+it."""
 EYE = np.eye(3)
 
 
@@ -59,8 +62,8 @@ class SensorNoise:
     """Standard deviation of the bias of the gyroscope before the flight, rad/s."""
     accel_bias: float = 0.3
     """The same of the accelerometer, m/s^2."""
-    start: tuple[float, float, float] = (0.1, 0.1, 0.05)
-    """Standard deviations of position, m, velocity, m/s, and attitude, rad, at the start."""
+    start: tuple[float, float, float] = (0.2, 0.1, 0.05)
+    """Standard deviations of position, m, velocity, m/s, and angles, rad, at the start."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ class ErrorState:
 
     @staticmethod
     def at(time: float, position: np.ndarray, rotation: np.ndarray, noise: SensorNoise) -> "ErrorState":
-        """A vehicle that stands at a known place."""
+        """A vehicle that stands at a known place, within `SensorNoise.start`."""
         place, speed, turn = noise.start
         deviation = np.repeat(
             [place, speed, turn, noise.gyro_bias, noise.accel_bias, noise.mounting, noise.offset], [3] * 6 + [1]
@@ -131,6 +134,18 @@ class ErrorState:
             self, time=self.time + dt, position=self.position + self.velocity * dt + 0.5 * gain * dt**2,
             velocity=self.velocity + gain * dt, rotation=rotation, body_rate=rate, covariance=covariance,
         )  # fmt: skip
+
+    def resting(self, gyroscope: np.ndarray) -> "ErrorState":
+        """The state of a vehicle that stands still: its velocity is zero, and its gyroscope (3,), rad/s, measures its
+        bias.
+        """
+        slope = np.zeros((6, SIZE))
+        slope[:3, VELOCITY], slope[3:, GYRO] = EYE, EYE
+        miss = np.concatenate([-self.velocity, gyroscope - self.gyro_bias])
+        cross = slope @ self.covariance
+        gain = np.linalg.solve(cross @ slope.T + STILL**2 * np.eye(6), cross).T
+        rest = np.eye(SIZE) - gain @ slope
+        return self._with(gain @ miss, rest @ self.covariance @ rest.T + STILL**2 * gain @ gain.T)
 
     def corrected(self, found: Corners, lens: Lens, openings: Openings, noise: SensorNoise) -> "tuple[ErrorState, int]":
         """The state, corrected by the corners of an image with its stamp, and how many of them were used.

@@ -63,6 +63,10 @@ class GateEstimator:
             self._past.popleft()
         self.state = self.state.moved(sample.gyroscope, sample.accelerometer, dt, self.noise)
 
+    def rest(self, gyroscope: np.ndarray) -> None:
+        """The vehicle stands still, and its gyroscope measures (3,), rad/s."""
+        self.state = self.state.resting(gyroscope)
+
     def look(self, found: Corners, stamp: float) -> bool:
         """Correct the state by an image with a stamp, s. False: it is too old, or no corner could be used."""
         after = [sample for _, sample in self._past if sample.time > stamp]
