@@ -8,6 +8,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import jax
@@ -30,7 +31,6 @@ from e2efly.simulation.scenes import camera
 from e2efly.simulation.scenes.camera import Mount
 from e2efly.simulation.scenes.course import HALF_DEPTH, frames
 from e2efly.simulation.scenes.scene import Scene
-from e2efly.simulation.sensors import eyes  # registers cameras as pytrees
 from e2efly.validation.bridge_session import FlightBench
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import imu_of
@@ -77,6 +77,18 @@ class GateCamera:
         c = self.camera
         readout = self.readout if self.told_readout else 0.0
         return Lens(c.width, c.height, (c.fov[0], c.fov[1]), c.pitch, c.position, readout)
+
+
+@dataclass(frozen=True)
+class GateFlight:
+    """The camera of a flight, and the seed of all that it draws."""
+
+    setup: GateCamera
+    seed: int
+
+    def begin(self, course: Course, start: RigidState) -> "GatePose":
+        """The pose source of the flight; see `GatePose.of`."""
+        return GatePose.of(self.setup, course, start, self.seed)
 
 
 def track_of(course: Course) -> RaceTrack:
@@ -127,7 +139,9 @@ class GateEyes:
         real = dataclasses.replace(known, position=known.position + shift)
         scene = Scene.of({"gate": frames(Gates.of(real), BANDS)}, BANDS)
         u = random.uniform(-1, 1, (1, 8))
-        angles, offset = (jnp.asarray(x, jnp.float32) for x in (c.angle_spread * u[:, :3], c.position_spread * u[:, 5:]))
+        angles, offset = (
+            jnp.asarray(x, jnp.float32) for x in (c.angle_spread * u[:, :3], c.position_spread * u[:, 5:])
+        )
         whole = camera.mounted(c, angles, jnp.asarray(1 + c.fov_spread * u[:, 3:4], jnp.float32), offset)
         return GateEyes(setup, known, scene, banded(whole), float(random.uniform(*c.latency)), random)
 
@@ -156,9 +170,7 @@ class GateEyes:
         stamps = np.array([time for time, _ in self._past])
         near = [(time, *self._past[int(np.argmin(np.abs(stamps - time)))]) for time in times]
         position = np.array([s.position + (time - at) * s.velocity for time, at, s in near])
-        turns = [
-            quaternion_of(rotation_of(s.quaternion) @ turned((time - at) * s.body_rate)) for time, at, s in near
-        ]
+        turns = [quaternion_of(rotation_of(s.quaternion) @ turned((time - at) * s.body_rate)) for time, at, s in near]
         c = self.setup.camera
         band = dataclasses.replace(c, height=c.height // BANDS)
         rows = _look(band, self.scene, self.mount, position.astype(np.float32), np.array(turns, np.float32))
@@ -275,7 +287,7 @@ def gate_poses(rig: FlightBench, setup: GateCamera, course: Course, seed: int) -
     return source
 
 
-@jax.jit
+@partial(jax.jit, static_argnames="band")
 def _look(
     band: CameraConfig, scene: Scene, mount: Mount, position: Float[Array, "b 3"], quaternion: Float[Array, "b 4"]
 ) -> Float[Array, "b h w"]:

@@ -68,6 +68,8 @@ class Trajectory:
     """Why the flight ended early, if the policy or the plant could not go on."""
     samples: tuple[FlightSample, ...] = ()
     """Moments between control steps, if they were requested."""
+    estimate: np.ndarray | None = None
+    """(t, 3) where the vehicle was told to be in each control step, world, m. None: it was told the truth."""
 
 
 class FlownPose(Protocol):
@@ -156,7 +158,7 @@ def flying(
     states, decisions, fault = [plant.state], [], ""
     moved = law is not None and law.disturbs
     felt = None if law is None else LawMemory.of(states[0], np.array(contract.hover_action), period, LATEST)
-    samples = [] if sample is None else [FlightSample.of(plant, 0.0)]
+    samples, estimates = [] if sample is None else [FlightSample.of(plant, 0.0)], list[np.ndarray]()
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
         now, then = k * period, (k + 1) * period
@@ -201,6 +203,7 @@ def flying(
             break
         decisions.append(decision)
         states.append(reached)
+        estimates.append(told.position)
     if not (memory.done or memory.failure):
         memory = judged(runtime, memory, states[-1].odometry(period * len(decisions)), period * len(decisions))
     return Trajectory(
@@ -212,6 +215,7 @@ def flying(
         failure=memory.failure,
         fault=fault,
         samples=tuple(samples),
+        estimate=None if pose is None else np.array(estimates).reshape(-1, 3),
     )  # fmt: skip
 
 

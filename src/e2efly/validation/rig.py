@@ -286,7 +286,9 @@ class Rig:
         IMU.
         """
         asked = AIDING_SCHEDULE if aids else schedule
-        return Betaflight.connect(link or open_link(self.sitl.msp), settings, asked, hover=hover, timeout=3.0, clock=self)
+        return Betaflight.connect(
+            link or open_link(self.sitl.msp), settings, asked, hover=hover, timeout=3.0, clock=self
+        )
 
     def set(self, **changes: Any) -> None:
         """Move the pilot's sticks and switches: fields of `Transmitter`."""

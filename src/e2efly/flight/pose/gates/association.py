@@ -70,11 +70,13 @@ def associated(
     assignments = [_assigned(each) for each in worth]
     scores = np.array([score for _, score in assignments]) + prior
     best = int(np.argmax(scores))
-    chosen = dict(assignments[best][0])
+    chosen = assignments[best][0]
+    seen, seen_as = dict(chosen), {f: e for e, f in chosen}
     for (pairs, _), score in zip(assignments, scores, strict=True):
-        if score > scores[best] - CLEAR and any(chosen.get(e, f) != f for e, f in pairs):
+        other = any(seen.get(e, f) != f or seen_as.get(f, e) != e for e, f in pairs)
+        if other and score > scores[best] - CLEAR:
             return []
-    return list(chosen.items())
+    return chosen
 
 
 def _assigned(worth: np.ndarray) -> tuple[list[tuple[int, int]], float]:

@@ -51,7 +51,7 @@ class SensorNoise:
     """Random walk of its bias, rad/s/sqrt(s)."""
     accel_walk: float = 5e-3
     """The same of the accelerometer, m/s^2/sqrt(s)."""
-    pixel: float = 3.0
+    pixel: float = 6.0
     """Standard deviation of a corner, pixels at 640 columns and 90 degrees: pixels, gates that stand elsewhere, bent
     lenses."""
     mounting: float = 0.035
@@ -200,17 +200,20 @@ class ErrorState:
         near[near] = lens.inside(lens.pixels(ahead[near]), MARGIN)
         body, ahead, way = body[near], ahead[near], (ways[near] @ self.rotation) @ view.T
         # the image is exposed later than its stamp, and its rows one after the other
-        drift = -np.cross(self.body_rate, body) - self.velocity @ self.rotation
-        late = self.offset + lens.readout * (lens.pixels(ahead)[:, 1] / lens.height - 0.5)
-        body = body + drift * late[:, None]
-        ahead = (body - np.array(lens.position)) @ view.T
-        ahead[:, 2] = np.maximum(ahead[:, 2], NEAREST)
+        speed = self.velocity @ self.rotation
+        drift = -np.cross(self.body_rate, body) - speed
+        late = (self.offset + lens.readout * (lens.pixels(ahead)[:, 1] / lens.height - 0.5))[:, None, None]
+        turn = EYE - late * crossing(self.body_rate)
         shift = np.zeros((len(body), 3, SIZE))
-        shift[:, :, POSITION] = -view @ self.rotation.T
-        shift[:, :, VELOCITY] = -(view @ self.rotation.T)[None] * late[:, None, None]
-        shift[:, :, ATTITUDE] = view @ crossing(body)
+        shift[:, :, POSITION] = -turn @ self.rotation.T
+        shift[:, :, VELOCITY] = -late * self.rotation.T
+        shift[:, :, ATTITUDE] = turn @ crossing(body) - late * crossing(speed)
+        shift[:, :, GYRO] = -late * crossing(body)
+        shift[:, :, OFFSET] = drift
+        ahead = (body + drift * late[:, 0] - np.array(lens.position)) @ view.T
+        ahead[:, 2] = np.maximum(ahead[:, 2], NEAREST)
+        shift = view @ shift
         shift[:, :, MOUNTING] = -crossing(ahead)
-        shift[:, :, OFFSET] = drift @ view.T
         slope = lens.slope(ahead)
         inward = np.einsum("kij,kj->ki", slope, way)
         inward /= np.maximum(np.linalg.norm(inward, axis=-1, keepdims=True), 1e-9)

@@ -15,9 +15,9 @@ from e2efly.flight.pose.gates.lens import Lens
 from e2efly.policy.images import NONE, Image
 
 FORM = (
-    "track, a name or the path of a .toml file; start = [x, y, z, heading] of the vehicle that stands, m and degrees; [camera] with width, height, "
-    "fov = [across, down] and pitch in degrees, rate in Hz, and optionally position, m, latency and readout, s; "
-    "[noise] with fields of SensorNoise"
+    "track, a name or the path of a .toml file; start = [x, y, z, heading] of the vehicle that stands, m and degrees; "
+    "[camera] with width, height, fov = [across, down] and pitch in degrees, rate in Hz, and optionally position, m, "
+    "latency and readout, s; [noise] with fields of SensorNoise"
 )
 _CAMERA = {"width", "height", "fov", "pitch", "rate"}
 _OPTIONAL = {"position", "latency", "readout"}

@@ -122,5 +122,3 @@ class GateSource:
         start, noise = self._setup.start, self._setup.noise
         state = ErrorState.at(time, start[:3], turned(np.array([0.0, 0.0, start[3]])), noise)
         return GateEstimator(state, self._setup.lens, self._openings, noise)
-
-
