@@ -35,8 +35,8 @@ KEPT = 136
 """Memory of one control step of a flight on a plant, bytes. All steps of all flights are kept."""
 
 
-Pose = Literal["truth", "gates"]
-"""Who tells a policy on a plant where it is."""
+Pose = Literal["truth", "gates"] | GateCamera
+"""Who tells a policy on a plant where it is: the plant, or the gates that the usual camera sees, or another camera."""
 
 
 @dataclass(frozen=True)
@@ -195,8 +195,8 @@ def validate(
         progress: called as progress(criterion, number of finished flights, number of all flights).
         baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
         pose: `truth`: the policy is told where it is. `gates`: the pose source `gates:` tells it, from rendered images
-            of a racing camera and from an IMU (`e2efly.validation.gate_pose.GateCamera`). The training simulator, with
-            which it is compared, tells the truth.
+            of a racing camera and from an IMU; a `GateCamera` says of which. The training simulator, with which it is
+            compared, tells the truth.
 
     Raises:
         ValueError: naming the option or the field, its value and what is accepted.
@@ -258,7 +258,8 @@ def gate_flights(pose: Pose, courses: Sequence[Course], seed: int) -> list[GateF
         return [None] * len(courses)
     for course in courses:
         track_of(course)
-    return [GateFlight(GateCamera(), seed + i) for i in range(len(courses))]
+    setup = pose if isinstance(pose, GateCamera) else GateCamera()
+    return [GateFlight(setup, seed + i) for i in range(len(courses))]
 
 
 def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: str) -> None:
