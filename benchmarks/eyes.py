@@ -62,18 +62,19 @@ def main() -> None:
     prepare("cpu")
     path = args.json or RESULTS / "eyes.json"
     kept = json.loads(path.read_text()) if path.exists() else {}
+    parts = kept.get("parts", {})
     with tempfile.TemporaryDirectory() as folder:
         if args.rows:
-            kept["conditions"] = [condition(name, args.flights, args.seed) for name in CONDITIONS]
-            kept["stress"] = stressed(args.flights // 4, args.seed)
+            parts["conditions"] = [condition(name, args.flights, args.seed) for name in CONDITIONS]
+            parts["stress"] = stressed(args.flights // 4, args.seed)
         elif args.firmware:
-            kept["firmware"] = firmware(args.firmware, args.seed)
+            parts["firmware"] = firmware(args.firmware, args.seed)
         else:
-            kept["tracks"] = [*tracks(args.flights, args.seed, Path(folder))]
-    for name, rows in kept.items():
-        if isinstance(rows, list) and rows:
-            print(f"{name}:\n{table(rows)}")
-    write("eyes", args.json, kept | {"seed": args.seed})
+            parts["tracks"] = tracks(args.flights, args.seed, Path(folder))
+    for name, rows in parts.items():
+        print(f"{name}:\n{table(rows)}")
+    others = [parts[name] for name in ("conditions", "stress", "firmware") if name in parts]
+    write("eyes", args.json, {"seed": args.seed, "parts": parts, "table": parts.get("tracks", []), "tables": others})
 
 
 def tracks(flights: int, seed: int, folder: Path) -> list[dict[str, Any]]:

@@ -45,9 +45,7 @@ def test_the_guard_ends_no_race_that_flies_high_enough() -> None:
 @pytest.mark.whole
 def test_a_whole_race_is_flown_by_a_camera_and_the_firmwares_own_imu() -> None:
     """No motion capture: rendered gates, and what MSP tells of gyroscope and accelerometer."""
-    flight = rehearse(
-        firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3, gates=GateCamera()
-    )
+    flight = rehearse(firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3, gates=GateCamera())
     assert flight.complete and flight.success, (flight.told, flight.reasons)
     assert flight.top_speed > 9.0
 
