@@ -77,8 +77,10 @@ class CrazyflieRig(FlownPeer):
         """What the pilot has typed."""
         return TypedWish(self.hand.armed, Mission(self.hand.mission)) if self.heard else None
 
-    def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Crazyflie:
-        del hover
+    def autopilot(
+        self, settings: FlightSettings, hover: HoverController | None = None, *, aids: bool = False
+    ) -> Crazyflie:
+        del hover, aids
         return Crazyflie.connect(self.wire, self.world.vehicle, settings, self.wish, 1.0, self)
 
     def command(self, rates: np.ndarray, thrust: float) -> None:

@@ -67,8 +67,10 @@ class MavlinkRig(FlownPeer):
         self._radio = self.time
         self._landing = 0.0
 
-    def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Mavlink:
-        del hover
+    def autopilot(
+        self, settings: FlightSettings, hover: HoverController | None = None, *, aids: bool = False
+    ) -> Mavlink:
+        del hover, aids
         return Mavlink.connect(self.wire, settings, 5.0, self)
 
     def hear(self) -> None:

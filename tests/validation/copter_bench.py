@@ -48,8 +48,10 @@ class CopterBench(CopterRig):
             self._real.send(up)
 
     def autopilot(
-        self, settings: FlightSettings, hover: HoverController | None = None, *, link: Link | None = None
-    ) -> Mavlink:
+        self, settings: FlightSettings, hover: HoverController | None = None, *, link: Link | None = None,
+        aids: bool = False,
+    ) -> Mavlink:  # fmt: skip
+        del aids
         return super().autopilot(settings, hover, link=link or self.wire)
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import load_policy
 from e2efly.validation import firmware_program, rehearsal
+from e2efly.validation.gate_pose import GateCamera
 from e2efly.validation.rehearsal import rehearse
 from e2efly.vehicles.loading import load_vehicle
 
@@ -38,6 +39,14 @@ def test_the_guard_ends_no_race_that_flies_high_enough() -> None:
     flight = rehearse(firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3)
     assert flight.complete, flight.reasons
     assert flight.success
+    assert flight.top_speed > 9.0
+
+
+@pytest.mark.whole
+def test_a_whole_race_is_flown_by_a_camera_and_the_firmwares_own_imu() -> None:
+    """No motion capture: rendered gates, and what MSP tells of gyroscope and accelerometer."""
+    flight = rehearse(firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3, gates=GateCamera())
+    assert flight.complete and flight.success, (flight.told, flight.reasons)
     assert flight.top_speed > 9.0
 
 

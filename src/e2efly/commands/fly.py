@@ -27,6 +27,7 @@ from e2efly.flight.pilot import throttle_map
 from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
 from e2efly.flight.pose.neighbours import Neighbours
+from e2efly.flight.pose.pose_source import AidedSource
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
 from e2efly.flight.publish import Live, targets_of
@@ -273,7 +274,7 @@ def run(options: Fly) -> int:
             stack.callback(commands.close)
         autopilot, watchdog = open_autopilot(
             options.link, body, settings, (options.hover, hover), watched=options.watchdog and not options.check,
-            excited=bool(excited),
+            excited=bool(excited), aids=isinstance(source, AidedSource),
         )  # fmt: skip
         stack.callback(autopilot.close)
         rows = autopilot.check(body, settings, contract)

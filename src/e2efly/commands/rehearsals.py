@@ -14,6 +14,7 @@ from e2efly.flight.settings import Fence
 from e2efly.tasks.route import Route, route_of
 from e2efly.validation import firmware_program
 from e2efly.validation.evaluation import Candidate
+from e2efly.validation.gate_pose import GateCamera
 from e2efly.validation.rehearsal import Rehearsal, rehearse
 from e2efly.validation.scenery import Scenery
 from e2efly.vehicles.vehicle import Vehicle
@@ -28,11 +29,13 @@ def fly_whole(
     *,
     route: Route | None = None,
     fence: Fence | None = None,
+    gates: bool = False,
 ) -> list[Rehearsal]:
     """Take off, hover, hand over to the policy, and land: the given number of flights, each from another place.
 
     A policy with cameras flies in another world each time. The worlds come from the training environment of the first
-    criterion, and so do the courses. Other policies fly the course of the route, or else the usual one.
+    criterion, and so do the courses. Other policies fly the course of the route, or else the usual one. With `gates`
+    there is no motion capture: the vehicle finds its place by the gates of the course.
 
     Raises:
         ValueError: for a course that the fence does not hold.
@@ -48,9 +51,10 @@ def fly_whole(
             scenery = None if env is None else Scenery.draw(env, seed + i)
             if scenery is not None:
                 route = dataclasses.replace(kind.drawn(scenery.course, Path(folder) / "track.toml"), outside=True)
-            flights.append(
-                rehearse(built, found.policy, vehicle, seed=seed + i, scenery=scenery, route=route, fence=fence)
-            )
+            flights.append(rehearse(
+                built, found.policy, vehicle, seed=seed + i, scenery=scenery, route=route, fence=fence,
+                gates=GateCamera() if gates else None,
+            ))  # fmt: skip
     return flights
 
 

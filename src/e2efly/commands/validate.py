@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -57,6 +57,9 @@ class Validate:
     """Cameras of AirSim that provide the policy's images: IMAGE=plant:CAMERA, or for a mask
     IMAGE=plant:CAMERA:RED,GREEN,BLUE with its colour in AirSim's segmentation. Other images are rendered from the
     task's world. Not with --stress. See docs/airsim.md."""
+    pose: Literal["truth", "gates"] = "truth"
+    """Who tells the policy where it is. truth: the plant. gates: the pose source gates:, which sees the gates of the
+    track by a rendered racing camera and has an IMU. See docs/eyes.md."""
     seed: int = 1_000_000
     """Seed of the starts."""
     vehicle: str | None = None
@@ -125,6 +128,7 @@ def run(asked: Asked) -> int:
             image=o.image,
             progress=progress,
             baseline=o.baseline,
+            pose=o.pose,
         )
     for note in found.notes():
         console.print(note, style="dim")
@@ -139,7 +143,7 @@ def run(asked: Asked) -> int:
         console.print(f"Report: {o.json} (in a browser: e2efly watch {o.json})")
     if o.log:
         console.print(f"Logs: {o.log}")
-    whole = _whole_flights(found, o.flights, console)
+    whole = _whole_flights(found, o.flights, console, o.pose)
     if not found.passed:
         console.print(
             f"{found.worst}: success drops by {found.criteria[found.worst].drop:.1f} points", style="bold red", end=", "
@@ -161,6 +165,7 @@ def _stress(o: Validate) -> int:
             raise ValueError(f"--{option} is {getattr(o, field.name)}; accepted without --stress, which has --least")
     console = Terminal()
     flies = {"rows": o.rows, "vehicle": o.vehicle, "controller": o.controller, "seed": o.seed, "baseline": o.baseline}
+    flies["pose"] = o.pose
     with _progress(o.plant, console) as progress:
         found = stress(o.policy, o.plant, FLIGHTS if o.episodes is None else o.episodes, **flies, progress=progress)
     plot = _folder(o, found.candidate) / f"{found.plant}_stress.png"
@@ -191,7 +196,7 @@ def _folder(o: Validate, flew: "Candidate") -> Path:
     return o.out or (flew.run.path if flew.run else beside(flew.file)) / "validation"
 
 
-def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
+def _whole_flights(found: "Validation", count: int, console: Console, pose: str) -> bool:
     """Fly whole flights, if the plant is the firmware and the policy flies the vehicle. Returns whether all were
     complete.
     """
@@ -201,7 +206,7 @@ def _whole_flights(found: "Validation", count: int, console: Console) -> bool:
     body, policy = load_vehicle(found.candidate.vehicle), found.candidate.policy
     if not found.plant.whole_flights or not count or policy.contract.refusals(body):
         return True
-    flights = fly_whole(found.candidate, body, count, console)
+    flights = fly_whole(found.candidate, body, count, console, gates=pose == "gates")
     console.print(flights_table(flights))
     return all(flight.complete for flight in flights)
 

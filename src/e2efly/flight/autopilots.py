@@ -4,7 +4,7 @@ import time
 
 from e2efly.config.registry import check_methods, load, referenced
 from e2efly.flight.autopilot import METHODS, Autopilot
-from e2efly.flight.betaflight.autopilot import EXCITATION_SCHEDULE, Betaflight, check_hover
+from e2efly.flight.betaflight.autopilot import AIDING_SCHEDULE, EXCITATION_SCHEDULE, Betaflight, check_hover
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.watchdog import WatchedLink
 from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
@@ -32,6 +32,7 @@ def open_autopilot(
     *,
     watched: bool,
     excited: bool,
+    aids: bool = False,
 ) -> tuple[Autopilot, Watchdog | None]:
     """Connect to an autopilot, and identify it. `close` of the autopilot closes the link.
 
@@ -44,6 +45,7 @@ def open_autopilot(
         hover: name of the hover controller, and the controller, which may need more telemetry.
         watched: a watchdog holds the link, where the autopilot does not land by itself when commands end.
         excited: the flight is one of identification, which needs more measurements.
+        aids: its IMU carries the poses on (`AidedSource`).
 
     Returns:
         The autopilot, and its watchdog, if it has one.
@@ -69,7 +71,7 @@ def open_autopilot(
     held: Link = WatchedLink(target) if watched else open_link(target)
     try:
         _connect(held, target)
-        schedule = EXCITATION_SCHEDULE if excited else SCHEDULE
+        schedule = AIDING_SCHEDULE if aids else EXCITATION_SCHEDULE if excited else SCHEDULE
         autopilot = Betaflight.connect(held, settings, schedule, hover=hover[1], timeout=CONNECT_S)
         check_hover(*hover, autopilot.info)
     except BaseException:

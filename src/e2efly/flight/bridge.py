@@ -36,7 +36,7 @@ from e2efly.flight.pilot.touch import LAGS
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.pace import pace_problem
-from e2efly.flight.pose.pose_source import PoseSource
+from e2efly.flight.pose.pose_source import AidedSource, PoseSource
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.sight import quality
 from e2efly.flight.sight.image_source import ImageSource
@@ -146,6 +146,7 @@ class Bridge:
         self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
         self._held, self._looked = self.sent, 0.0
         self._unlike: str | None = None
+        self._aided = source if isinstance(source, AidedSource) else None
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
@@ -305,6 +306,8 @@ class Bridge:
             self.estimate = estimate.feel(self.estimate, measured, halfway, flight.mode, now)
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)
+                if self._aided is not None:
+                    self._aided.feel(halfway, measured.gyro, force, standing=measured.standing)
                 if sent is not None and acts and flying and not flight.blind:
                     swing = self._history.swing(asked)
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)

@@ -60,8 +60,10 @@ class FlightBench(Protocol):
         """Move the pilot's sticks and switches: fields of `firmware_rig.Transmitter`."""
         ...
 
-    def autopilot(self, settings: FlightSettings, hover: HoverController | None = None) -> Autopilot:
-        """The autopilot, identified, for a bridge with these settings."""
+    def autopilot(
+        self, settings: FlightSettings, hover: HoverController | None = None, *, aids: bool = False
+    ) -> Autopilot:
+        """The autopilot, identified, for a bridge with these settings. It `aids` a pose source by its IMU."""
         ...
 
 

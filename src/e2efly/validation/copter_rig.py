@@ -55,10 +55,11 @@ class CopterRig(FirmwareRig[CopterSitl]):
         self.sitl.channels = channels if self.heard else None
 
     def autopilot(
-        self, settings: FlightSettings, hover: HoverController | None = None, *, link: Link | None = None
-    ) -> Mavlink:
-        """The firmware as a bridge's autopilot. Without a link, over its own port."""
-        del hover
+        self, settings: FlightSettings, hover: HoverController | None = None, *, link: Link | None = None,
+        aids: bool = False,
+    ) -> Mavlink:  # fmt: skip
+        """The firmware as a bridge's autopilot. Without a link, over its own port. Its IMU is told often as it is."""
+        del hover, aids
         held = link or open_link(self.sitl.link)
         while not held.alive:
             held.poll(self.now())

@@ -23,6 +23,7 @@ from e2efly.validation.reality import Reality, check_realities
 from e2efly.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from e2efly.validation.gate_pose import GateFlight
     from e2efly.validation.plant_sight import Sight
 
 WORTH = 20
@@ -84,6 +85,8 @@ class FleetFlight:
     """The conditions of the flight."""
     sight: "Sight | None" = None
     """The cameras and their world, for a policy that sees."""
+    gates: "GateFlight | None" = None
+    """How the vehicle sees the gates that tell it where it is. None: it is told the truth."""
 
 
 def fly_all(
@@ -110,7 +113,7 @@ def fly_all(
     chunks = [flights[i : i + size] for i in range(0, len(flights), size)]
     context = multiprocessing.get_context("spawn")  # a fork would copy JAX's threads in an undefined state
     contract = load_policy(mission.policy).contract
-    told = contract.task, bool(contract.images)
+    told = contract.task, bool(contract.images) or any(flight.gates is not None for flight in flights)
     pool = ProcessPoolExecutor(min(count, len(chunks)), context, _prepare, told)
     try:
         pending = [pool.submit(_fly_chunk, mission, chunk) for chunk in chunks]
@@ -165,7 +168,8 @@ def _flying(mission: FleetMission, policy: Policy | Baseline, plant: Plant, flig
             plant.expose({name: sight.shutter(i) for i, name in own.items()})
         images = sight.begin({i: partial(plant.shown, name) for i, name in own.items()}).images
     air, law, sample = reality.air, reality.law, mission.sample
-    return flying(runtime, plant, flight.start, mission.duration, latency, air, sample, images, law)
+    pose = None if flight.gates is None else flight.gates.begin(flight.course, flight.start)
+    return flying(runtime, plant, flight.start, mission.duration, latency, air, sample, images, law, pose)
 
 
 def _prepare(task: str, sees: bool) -> None:

@@ -4,12 +4,13 @@ import dataclasses
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from e2efly.control.vectors import Quat, Vec3
 from e2efly.policy.goal import Body
+from e2efly.policy.odometry import Odometry
 from e2efly.policy.others import Others, nobody
 from e2efly.policy.runtime import Imu, Runtime, act, begin, judged
 from e2efly.validation.law_step import LawMemory, LawStep, air_of, arrived, observed
@@ -67,6 +68,25 @@ class Trajectory:
     """Why the flight ended early, if the policy or the plant could not go on."""
     samples: tuple[FlightSample, ...] = ()
     """Moments between control steps, if they were requested."""
+    estimate: np.ndarray | None = None
+    """(t, 3) where the vehicle was told to be in each control step, world, m. None: it was told the truth."""
+
+
+class FlownPose(Protocol):
+    """Where a vehicle on a plant believes to be."""
+
+    @property
+    def interval(self) -> float:
+        """Longest time between two of its steps, s."""
+        ...
+
+    def step(self, after: RigidState, now: float) -> None:
+        """Sense the motion from the last step to the state `after`, at `now`, s since the start."""
+        ...
+
+    def odometry(self, now: float) -> Odometry:
+        """What the vehicle is told of its motion."""
+        ...
 
 
 Flying = Generator[RigidState | None, Sequence[RigidState] | None, Trajectory]
@@ -107,6 +127,7 @@ def flying(
     sample: float | None = None,
     images: Callable[[int, Sequence[RigidState], Sequence[RigidState]], Sequence[np.ndarray]] | None = None,
     law: LawStep | None = None,
+    pose: "FlownPose | None" = None,
 ) -> Flying:
     """Fly from one start until the time is over, or the task is done or has failed.
 
@@ -122,6 +143,7 @@ def flying(
         sample: longest time between two samples, s. None: no samples are kept.
         images: the cameras' images, by control step, the states until then and the others now (`PlantWatch.images`).
         law: the control steps of the flight under a law of the stress.
+        pose: tells the policy where it is. None: it is told the truth.
 
     Returns:
         The flight. A policy that refuses its observation, or a plant that fails, ends it with a `fault`.
@@ -140,7 +162,7 @@ def flying(
     states, decisions, fault = [plant.state], [], ""
     moved = law is not None and law.disturbs
     felt = None if law is None else LawMemory.of(states[0], np.array(contract.hover_action), period, LATEST)
-    samples = [] if sample is None else [FlightSample.of(plant, 0.0)]
+    samples, estimates = [] if sample is None else [FlightSample.of(plant, 0.0)], list[np.ndarray]()
     memory = begin(runtime, states[0].odometry(0.0), 0.0)
     for k in range(steps):
         now, then = k * period, (k + 1) * period
@@ -148,9 +170,10 @@ def flying(
         try:
             truth = states[-1].odometry(now)
             measured = imu_of(states[max(k - 1, 0)], states[k], period)
-            seen = None if air is None else air.seen(k, truth)
+            told = truth if pose is None else pose.odometry(now)
+            seen = (None if pose is None else told) if air is None else air.seen(k, told)
             if law is not None and felt is not None:
-                seen, felt = observed(law.at(k), felt, truth if seen is None else seen, period)
+                seen, felt = observed(law.at(k), felt, told if seen is None else seen, period)
                 measured = dataclasses.replace(measured, gyroscope=measured.gyroscope + law.error[k, 9:12])
             shown = () if images is None else images(k, states, rest or ())
             others = nearest(states[-1], rest, runtime.course.goal.neighbours) if rest else None
@@ -169,19 +192,23 @@ def flying(
                 plant.disturb(air.wind[k], air.rotor_share[k])
             at = now
             for acting, seconds in parts:
-                count = 1 if sample is None else max(math.ceil(seconds / sample - 1e-6), 1)
+                longest = min(seconds if sample is None else sample, seconds if pose is None else pose.interval)
+                count = max(math.ceil(seconds / longest - 1e-6), 1)
                 for _ in range(count):
                     plant.step(acting, seconds / count)
                     yield None
                     at += seconds / count
                     if sample is not None:
                         samples.append(FlightSample.of(plant, at))
+                    if pose is not None:
+                        pose.step(RigidState.of(plant.state), at)
             reached = RigidState.of(plant.state)
         except (ValueError, OSError) as error:
             fault = f"after {now:.2f} s: {error}"
             break
         decisions.append(decision)
         states.append(reached)
+        estimates.append(told.position)
     plant.leave()
     if not (memory.done or memory.failure):
         memory = judged(runtime, memory, states[-1].odometry(period * len(decisions)), period * len(decisions))
@@ -194,6 +221,7 @@ def flying(
         failure=memory.failure,
         fault=fault,
         samples=tuple(samples),
+        estimate=None if pose is None else np.array(estimates).reshape(-1, 3),
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.law_step import BODY, LawStep
 from e2efly.validation.plant import Plant
-from e2efly.validation.plant_validation import SAMPLE, flyable, plant_name
+from e2efly.validation.plant_validation import SAMPLE, Pose, flyable, gate_flights, plant_name
 from e2efly.validation.reality import Air, Reality, check_realities
 from e2efly.validation.starts import draw_starts
 from e2efly.validation.stress import Report, check_rows, draws, every_row, laws_of
@@ -46,6 +46,7 @@ def stress(
     seed: int = SEED,
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
     baseline: str | None = None,
+    pose: Pose = "truth",
 ) -> Report:
     """Fly a policy with the bridge's runtime on a plant, in every row that the plant can simulate.
 
@@ -62,6 +63,7 @@ def stress(
         seed: seed of the starts and of the rows' draws.
         progress: called as progress(criterion, number of finished flights, number of all flights).
         baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
+        pose: who tells the policy where it is; see `e2efly.validate`.
 
     Raises:
         ValueError: naming the option, its value and what is accepted; or for a row that the plant cannot simulate.
@@ -107,7 +109,9 @@ def stress(
             if row in LAWS:
                 meets = under_law(LAWS[row], meets, flown, seed, steps, env.control_period)
             seen = starts.sights(env, seed, drawn.camera)
-            asked += [FleetFlight(*begin, met, sees) for begin, met, sees in zip(begins, meets, seen, strict=True)]
+            eyes = gate_flights(pose, starts.courses, seed)
+            each = zip(begins, meets, seen, eyes, strict=True)
+            asked += [FleetFlight(*begin, met, sees, gates) for begin, met, sees, gates in each]
         mission = FleetMission(found.file, plant_name(plant), own, believed, float(suite.episode_s), baseline=baseline)
         total = len(asked)
         flights = fly_all(mission, asked, lambda done: progress(name, done, total))  # noqa: B023

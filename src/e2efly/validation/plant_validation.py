@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,11 +15,13 @@ from e2efly.environment.episodes import Episodes, rows, summary
 from e2efly.flight.sight.sources import by_image
 from e2efly.logs.csv_file import write_csv
 from e2efly.policy.contract import Contract
+from e2efly.policy.goal import Course
 from e2efly.policy.runtime import check
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import fields_of
 from e2efly.validation.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
+from e2efly.validation.gate_pose import GateCamera, GateFlight, track_of
 from e2efly.validation.log import SAMPLE, record_of
 from e2efly.validation.plant import Plant
 from e2efly.validation.plant_flight import Trajectory
@@ -31,6 +33,10 @@ from e2efly.vehicles.vehicle import Controller, Vehicle
 
 KEPT = 136
 """Memory of one control step of a flight on a plant, bytes. All steps of all flights are kept."""
+
+
+Pose = Literal["truth", "gates"] | GateCamera
+"""Who tells a policy on a plant where it is: the plant, or the gates that the usual camera sees, or another camera."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,17 @@ class Comparison:
         """Loss of success on the plant, percentage points."""
         return 100 * float(np.mean(self.trained.success) - np.mean(self.flown.success))
 
+    @property
+    def pose_error(self) -> tuple[float, float] | None:
+        """Root mean square and largest distance of the vehicles from where they were told to be, m. None: they were
+        told the truth.
+        """
+        told = [(f.estimate, f.position[: len(f.estimate)]) for f in self.flights if f.estimate is not None]
+        if not told:
+            return None
+        distance = np.concatenate([np.linalg.norm(estimate - true, axis=1) for estimate, true in told])
+        return float(np.sqrt(np.mean(distance**2))), float(distance.max())
+
     def as_json(self, plant: str, suite: TaskConfig) -> dict[str, Any]:
         """A summary for both places, and a row for every start on the plant."""
         faults = sum(bool(flight.fault) for flight in self.flights)
@@ -62,7 +79,9 @@ class Comparison:
             | course
             for trained, row, flight, start, course in places
         ]
-        flown = summary(self.flown) | {"faults": faults}
+        flown: dict[str, Any] = summary(self.flown) | {"faults": faults}
+        if (error := self.pose_error) is not None:
+            flown["pose_error_m"] = dict(zip(("rms", "largest"), error, strict=True))
         return {"drop": self.drop, "training": summary(self.trained), plant: flown, "starts": starts}
 
 
@@ -111,6 +130,12 @@ class Validation:
             notes.append(f"Trained with a latency of {low:g} to {high:g} s; the plant flies with {flies:g} s.")
         if (own := self.plant.latency) > self.candidate.latency:
             notes.append(f"The plant itself takes {own:g} s from command to rate loop, longer than that.")
+        for name, each in self.criteria.items():
+            if (error := each.pose_error) is not None:
+                notes.append(
+                    f"{name}: the gates told where the vehicle was to {100 * error[0]:.1f} cm RMS, "
+                    f"{100 * error[1]:.0f} cm at worst."
+                )
         return [*notes, *self.differences, *self.candidate.notes]
 
     def as_json(self) -> dict[str, Any]:
@@ -144,6 +169,7 @@ def validate(
     image: Sequence[str] = (),
     progress: Callable[[str, int, int], None] = lambda criterion, done, total: None,
     baseline: str | None = None,
+    pose: Pose = "truth",
 ) -> Validation:
     """Fly a policy with the bridge's runtime on another plant, from the starts of `evaluate`.
 
@@ -168,6 +194,9 @@ def validate(
             are rendered from the task's world.
         progress: called as progress(criterion, number of finished flights, number of all flights).
         baseline: the hover controller that flies in place of the policy; see `e2efly.evaluate`.
+        pose: `truth`: the policy is told where it is. `gates`: the pose source `gates:` tells it, from rendered images
+            of a racing camera and from an IMU; a `GateCamera` says of which. The training simulator, with which it is
+            compared, tells the truth.
 
     Raises:
         ValueError: naming the option or the field, its value and what is accepted.
@@ -208,14 +237,31 @@ def validate(
         mission = FleetMission(
             found.file, name, own, found.flown.believed, float(suite.episode_s), cameras, sample, baseline, agents
         )
-        begins = zip(starts.states, starts.courses, starts.sights(env, seed), strict=True)
-        asked = [FleetFlight(start, course, reality, sight) for start, course, sight in begins]
+        parts = starts.states, starts.courses, starts.sights(env, seed), gate_flights(pose, starts.courses, seed)
+        asked = [
+            FleetFlight(start, course, reality, sight, gates)
+            for start, course, sight, gates in zip(*parts, strict=True)
+        ]
         flights = fly_all(mission, asked, lambda done: progress(criterion, done, episodes))  # noqa: B023
         if log is not None:
             _write_logs(Path(log), criterion, flights, found.policy.contract.action.mode)
         verdicts = judge(env, starts, flights, suite.settling_s)
         criteria[criterion] = Comparison(trained[criterion], verdicts, starts, flights)
     return Validation(found, kind, seed, max_drop, criteria, differences)
+
+
+def gate_flights(pose: Pose, courses: Sequence[Course], seed: int) -> list[GateFlight | None]:
+    """The camera of each flight that is told where it is by gates.
+
+    Raises:
+        ValueError: for a course without gates that stand still.
+    """
+    if pose == "truth":
+        return [None] * len(courses)
+    for course in courses:
+        track_of(course)
+    setup = pose if isinstance(pose, GateCamera) else GateCamera()
+    return [GateFlight(setup, seed + i) for i in range(len(courses))]
 
 
 def _write_logs(folder: Path, criterion: str, flights: list[Trajectory], mode: str) -> None:

@@ -13,6 +13,7 @@ from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pilot.hovering import hover_controller
+from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.settings import Fence
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
@@ -20,6 +21,8 @@ from e2efly.policy.runtime import Acting, RuntimeState
 from e2efly.tasks.route import Route, course_for, route_of, usual_route
 from e2efly.validation.bridge_session import REACH, FlightBench, FlownSession, Session, open_fence, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
+from e2efly.validation.gate_bench import gate_poses
+from e2efly.validation.gate_pose import GateCamera
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rig import Rig
 from e2efly.validation.scenery import Scenery
@@ -91,14 +94,16 @@ def rehearse(
     route: Route | None = None,
     fence: Fence | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
+    gates: GateCamera | None = None,
 ) -> Rehearsal:
     """Fly one whole flight. The vehicle is that of the world and of the bridge.
 
     `scenery` is the world that a policy sees. `wrap` puts a wrapper between each camera and the bridge. Without a
-    `route` the course is the usual one, without a `fence` the fence is far away.
+    `route` the course is the usual one, without a `fence` the fence is far away. With `gates` there is no motion
+    capture: the poses come from the gates of the course, as this camera sees them, and from the firmware's IMU.
 
     Raises:
-        ValueError: for a course that the fence does not hold.
+        ValueError: for a course that the fence does not hold, or one without gates.
     """
     course = whole_course(policy, vehicle, route)
     course = course if scenery is None else scenery.on(course)
@@ -108,7 +113,9 @@ def rehearse(
         latency = max(policy.contract.latency_of(vehicle) - LINK_S, 0.0)
         with Rig(firmware, Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
-            flight = whole_flight(rig, policy, course, seed, log, [wrap(source) for source in sources], fence)
+            cameras = [wrap(source) for source in sources]
+            poses = None if gates is None else gate_poses(rig, gates, course, seed)
+            flight = whole_flight(rig, policy, course, seed, log, cameras, fence, poses)
     return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
 
 
@@ -125,16 +132,22 @@ def _unhurt(flight: Rehearsal, scenery: Scenery, course: Course, radius: float) 
 
 def whole_flight(
     rig: FlightBench, policy: Acting, course: Course, seed: int, log: Log | None, cameras: Sequence[ImageSource],
-    fence: Fence | None,
+    fence: Fence | None, source: PoseSource | None = None,
 ) -> Rehearsal:  # fmt: skip
-    """One whole flight on a bench, from the ground to the ground; see `rehearse`. The latency is the bench's."""
+    """One whole flight on a bench, from the ground to the ground; see `rehearse`. The latency is the bench's, and so
+    are the poses, unless there is another source of them.
+    """
     rig.state = parked(rig.world, course, seed)
     rig.sleep(0.5)
     height = course.origin.points(course.start)[2] - rig.world.vehicle.feet_height
     wide = open_fence(rig.world.vehicle, REACH_IN_SIGHT if cameras else REACH)
     settings = rehearsal_settings(height, fence=fence or wide)
     hover = hover_controller(HOVER, rig.world.vehicle, rig.latency + LINK_S)
-    session = Session(rig, settings, policy=policy, course=course, log=log, cameras=cameras, hover=hover)
+    autopilot = rig.autopilot(settings, hover, aids=source is not None)
+    session = Session(
+        rig, settings, policy=policy, course=course, log=log, autopilot=autopilot, source=source, cameras=cameras,
+        hover=hover,
+    )  # fmt: skip
     try:
         up = session.take_off(3.0)
         rig.set(mission="policy")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from e2efly.flight.betaflight.autopilot import Betaflight
+from e2efly.flight.betaflight.autopilot import AIDING_SCHEDULE, Betaflight
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.firmware_gains import gain_lines, gains_of
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
@@ -97,10 +97,14 @@ class Rig(FirmwareRig[Sitl]):
         *,
         link: Link | None = None,
         schedule: Mapping[int, float] = SCHEDULE,
+        aids: bool = False,
     ) -> Betaflight:
-        """The firmware as a bridge's autopilot. Without a link, over its own port."""
+        """The firmware as a bridge's autopilot. Without a link, over its own port. It `aids` a pose source by its
+        IMU.
+        """
+        asked = AIDING_SCHEDULE if aids else schedule
         return Betaflight.connect(
-            link or open_link(self.sitl.msp), settings, schedule, hover=hover, timeout=3.0, clock=self
+            link or open_link(self.sitl.msp), settings, asked, hover=hover, timeout=3.0, clock=self
         )
 
 

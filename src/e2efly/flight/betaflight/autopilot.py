@@ -34,6 +34,9 @@ EXCITATION_SCHEDULE = SCHEDULE | {RawImu.CODE: 100.0, Motor.CODE: 100.0}
 """What a flight of identification requests, and how often, Hz: inertia and motor lag show only in the gyroscope and the
 motor outputs."""
 
+AIDING_SCHEDULE = EXCITATION_SCHEDULE | {RawImu.CODE: 250.0}
+"""What is requested for a pose source that the IMU carries on: a measurement in each control step."""
+
 
 class Betaflight:
     """One flight controller with Betaflight, identified."""

@@ -2,7 +2,9 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
 
 from e2efly.policy.odometry import Sample
 
@@ -40,6 +42,22 @@ class PoseSource(Protocol):
 
     def describe(self) -> str:
         """A description of the source, for people and logs."""
+        ...
+
+
+@runtime_checkable
+class AidedSource(PoseSource, Protocol):
+    """A source that carries its poses on by the IMU of the flight controller."""
+
+    def feel(self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool) -> None:
+        """A sample of the IMU.
+
+        Args:
+            time: when it was taken, s.
+            gyroscope: (3,) body rate, rad/s.
+            force: (3,) specific force, body, m/s^2.
+            standing: the vehicle stands still on the ground.
+        """
         ...
 
 
