@@ -75,7 +75,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         hover_action=_decimals(env.hover),
         courses=None if courses is None else (*courses, *config.env.payload.domain()),
         sensing=sensing_of(about, latency, float(rate)),
-        others=env.task.company if getattr(env.task, "neighbours", 0) else None,
+        others=getattr(env.task, "company", None),
     )
 
 

@@ -5,7 +5,7 @@ Imports no JAX and no simulator: a plant imports its own simulator when it is ma
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -129,7 +129,7 @@ class Plant(ABC):
         return cls(vehicle, contract.action.mode)  # type: ignore[call-arg]
 
     @classmethod
-    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> list[Self]:
+    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> Sequence[Self]:
         """The plants of the vehicles of a world. Unless a plant does it otherwise, each is in a physics of its own: it
         flies through the others.
 

@@ -1,6 +1,7 @@
 """Options and recipes: fly fast through a random forest, seen only by a camera."""
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -66,6 +67,11 @@ class AvoidConfig(TaskConfig):
     """Height to fly at above the ground, m."""
     ceiling: float = number(3.0, endless=True)
     """The episode fails above this height, m."""
+    swing: float = number(0.0, high=5.0, added=True, sets_shapes=True)
+    """Largest amplitude with which a trunk swings to and fro, upright, m. Each has its own, and its own level direction
+    and phase. 0: they stand still (sets shapes)."""
+    swing_period: tuple[float, float] = number((3.0, 8.0), low=0.5, rising=True, added=True)
+    """Period of a trunk that swings, s."""
     collisions_end: bool = True
     """Whether a collision ends the episode. In training it does not, so that the policy learns from what follows."""
 
@@ -82,8 +88,12 @@ class AvoidConfig(TaskConfig):
         }
 
     def domain(self) -> Domain:
-        """The commanded speed, and a forest up to a density: parts of every forest are thinner."""
+        """The commanded speed, and a forest up to a density: parts of every forest are thinner. If trunks move: how
+        fast.
+        """
+        fastest = 2 * math.pi * self.swing / self.swing_period[0]
         return (
+            *((extent("trunk_speed", "m/s", (0.0, fastest)),) if self.swing else ()),
             extent("speed", "m/s", self.speed),
             extent("tree_density", "1/m^2", (0.0, self.forest.density)),
             extent("trunk_radius", "m", self.forest.radius),

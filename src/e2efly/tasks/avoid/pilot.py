@@ -33,6 +33,7 @@ def best_heading(
     radius: float | Array,
     side: float | Array,
     others: Others | None = None,
+    swing: bool = False,
 ) -> Float[Array, " n"]:
     """The heading that makes most progress towards a bearing, with distance to trunks and to the sides of the lane.
 
@@ -44,6 +45,7 @@ def best_heading(
         radius: radius of the vehicle, m.
         side: largest |y| of the lane, which must not be passed, m.
         others: other vehicles of the same size, as they are now, which fly straight on.
+        swing: whether trees move. The pilot knows where they will be.
 
     Returns:
         The heading, rad from world x. It has no gradient.
@@ -65,8 +67,10 @@ def best_heading(
         wanted = wanted * jnp.minimum(1.0, most / jnp.maximum(size, most))
         mean, pushed = wanted + (pushed - wanted) * kept_mean, wanted + (pushed - wanted) * kept
         place, moving = place + STEP * moving + STEP**2 / 2 * mean, moving + STEP * mean
-        x, y = place[..., 0], place[..., 1]
-        distance = jnp.sqrt((x[..., None] - tree_x) ** 2 + (y[..., None] - tree_y) ** 2)
+        x, y, there_x, there_y = place[..., 0], place[..., 1], tree_x, tree_y
+        if swing:
+            there_x, there_y = (trees.position(flier.time + time + STEP)[:, None, :, i] for i in range(2))
+        distance = jnp.sqrt((x[..., None] - there_x) ** 2 + (y[..., None] - there_y) ** 2)
         gap = jnp.minimum(jnp.min(distance - reach, axis=-1), side - jnp.abs(y) - radius)
         if others is not None:
             there = others.position[..., :2] + (time + STEP) * others.velocity[..., :2]

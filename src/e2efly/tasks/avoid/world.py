@@ -44,7 +44,29 @@ class Avoid(AvoidGoal):
         speed = between(c.speed, u[:, 2])
         end = jnp.stack([zero + c.forest.length, zero, zero], axis=-1)
         trees = forest(trees_key, n, c.forest, state.position, end)
+        if c.swing:
+            trees = self.swinging(jax.random.fold_in(key, 3), trees, state.position)
         return dataclasses.replace(state, quaternion=from_euler(zero, zero, 0.3 * u[:, 3])), AvoidWorld(speed, trees)
+
+    def swinging(self, key: PRNGKeyArray, trees: Solids, start: Float[Array, "n 3"]) -> Solids:
+        """The trunks as they swing, with any phase. One that would come near the start is left out."""
+        c, turn = self.config, 2 * jnp.pi
+        far, way, phase, period = jax.random.uniform(key, (4, *trees.active.shape))
+        shortest, longest = c.swing_period
+        far, way, phase = c.swing * far, turn * way, turn * phase
+        along = far[..., None] * jnp.stack([jnp.cos(way), jnp.sin(way), 0.0 * way], axis=-1)
+        away = jnp.linalg.norm(trees.centre[..., :2] - start[:, None, :2], axis=-1)
+        return dataclasses.replace(
+            trees,
+            active=trees.active & (away - trees.size[..., 0] - far > c.forest.clear),
+            cosine=along * jnp.cos(phase)[..., None],
+            sine=along * jnp.sin(phase)[..., None],
+            rate=turn / (shortest + (longest - shortest) * period),
+        )
+
+    def flier(self, after: State, time: Float[Array, " n"]) -> Flier:
+        """The motion from which the expert flies on. Only trunks that swing are elsewhere at another time."""
+        return Flier.usual(after.position, after.velocity, time if self.config.swing else 0.0)
 
     def expert(self, memory: AvoidWorld, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
         """Velocity, m/s, and yaw, rad, of an expert that knows every tree, and all others if there are any.
@@ -55,7 +77,9 @@ class Avoid(AvoidGoal):
         bearing = jnp.arctan2(away[:, 1], away[:, 0])
         side = self.config.forest.width / 2
         others = self.others(memory)
-        heading = best_heading(memory.trees, flier, bearing, memory.speed, self.shape.radius, side, others)
+        heading = best_heading(
+            memory.trees, flier, bearing, memory.speed, self.shape.radius, side, others, self.config.swing > 0
+        )
         level = memory.speed[:, None] * jnp.stack([jnp.cos(heading), jnp.sin(heading)], axis=-1)
         climb = jnp.clip(STRICT * away[:, 2:], -CLIMB, CLIMB)
         return jnp.concatenate([level, climb], axis=-1), (heading + bearing) / 2
@@ -80,6 +104,6 @@ class Avoid(AvoidGoal):
         """The goal's verdict, with signals for the reward."""
         hit = struck(self.scene(memory), before, after, time, self.control_period, self.checks, self.shape.radius)
         moved, outcome = self.verdict(memory, before, after, time, hit)
-        wanted, _ = self.expert(memory, Flier.usual(after.position, after.velocity))
+        wanted, _ = self.expert(memory, self.flier(after, time))
         signals = {"desired_velocity": wanted, "desired_speed": memory.speed}
         return moved, dataclasses.replace(outcome, signals=signals)

@@ -17,7 +17,7 @@ from e2efly.tasks import company
 from e2efly.tasks.avoid.world import Avoid, AvoidWorld
 from e2efly.tasks.avoid_together import AvoidTogetherConfig
 from e2efly.tasks.avoid_together.goal import AvoidTogetherGoal
-from e2efly.tasks.task import Flier, struck
+from e2efly.tasks.task import struck
 
 
 @jax.tree_util.register_dataclass
@@ -63,7 +63,10 @@ class AvoidTogether(AvoidTogetherGoal, Avoid):
         away = jnp.linalg.norm(
             trees.centre[:, None, :, :2] - state.position.reshape(-1, a, 3).repeat(a, 0)[:, :, None, :2], axis=-1
         )
-        free_of = jnp.all(away - trees.size[:, None, :, 0] > c.forest.clear, axis=1)
+        wide = trees.size[:, None, :, 0]
+        if c.swing:
+            wide += jnp.sqrt(jnp.sum(trees.cosine**2 + trees.sine**2, axis=-1))[:, None]
+        free_of = jnp.all(away - wide > c.forest.clear, axis=1)
         trees = dataclasses.replace(trees, active=trees.active & free_of)
         no, bodies = jnp.zeros(n, bool), company.all_others(state, a)
         return state, AvoidTogetherWorld(world.speed, trees, bodies, jnp.zeros(n), no, ~no, y)
@@ -97,7 +100,7 @@ class AvoidTogether(AvoidTogetherGoal, Avoid):
         ends = company.any_of_world(left | (crashed & (self.config.collisions_end > 0)), a) | all_past
         bodies = company.all_others(jax.lax.stop_gradient(after), a)
         moved = dataclasses.replace(memory, bodies=bodies, time=time, past=past, clean=clean)
-        wanted, _ = self.expert(memory, Flier.usual(after.position, after.velocity))
+        wanted, _ = self.expert(memory, self.flier(after, time))
         signals = {
             "desired_velocity": wanted, "desired_speed": memory.speed, "misses": company.misses(after, a, 2 * radius),
         }  # fmt: skip

@@ -72,14 +72,13 @@ class MujocoWorld:
         Raises:
             ValueError: for commands that are held for different times.
         """
-        flown = [plant.asked for plant in self.plants if not plant.left]
-        if not flown or None in flown:
+        asked = [plant.asked for plant in self.plants if not plant.left]
+        times = [each[1] for each in asked if each is not None]
+        if not times or len(times) < len(asked):
             return
-        (_, dt), *rest = flown
-        if any(abs(other - dt) > MOMENT for _, other in rest):
-            raise ValueError(
-                f"the vehicles of a world hold their commands for {[each for _, each in flown]} s; accepted: one time"
-            )
+        dt = times[0]
+        if max(times) - min(times) > MOMENT:
+            raise ValueError(f"the vehicles of a world hold their commands for {times} s; accepted: one time")
         count = math.ceil((dt - MOMENT) / self._largest_step)
         self.model.opt.timestep = period = dt / count
         for _ in range(count):
@@ -115,7 +114,7 @@ class MujocoPlant(Plant):
         self.reset(RigidState(np.array([0.0, 0.0, vehicle.feet_height]), np.zeros(3), np.eye(4)[0], np.zeros(3)))
 
     @classmethod
-    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> list[Self]:
+    def company(cls, vehicle: Vehicle, contract: Contract, count: int) -> Sequence[Self]:
         """Vehicles in one model, which push each other when they touch."""
         plants = [cls.of(vehicle, contract) for _ in range(count)]
         if count > 1:
@@ -135,7 +134,8 @@ class MujocoPlant(Plant):
         self._lag, self._gain = model.actuator_dynprm[motors, 0], model.actuator_gainprm[motors, 0]
         self._offset, self._through = model.actuator_biasprm[motors, 0], data.actuator_velocity[drags]
         self._drag = model.actuator_biasprm[drags]
-        self.asked, self.left = None, False
+        self.asked: tuple[list[float], float] | None = None
+        self.left = False
 
     def meet(self, body: Vehicle, plain_mixer: bool = False) -> None:
         """Fly another body from the next `reset` on, which the flight controller does not know."""
