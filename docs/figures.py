@@ -62,6 +62,7 @@ TITLES = {
     "sim_to_sim": "The same policies in MuJoCo, 200 starts",
     "airsim": "The same policies over AirSim's RPC, 20 starts",
     "mavlink": "Whole flights over MAVLink, PX4 and ArduCopter as they document themselves",
+    "arducopter": "Whole flights through the real ArduCopter over MAVLink, nobody helping",
     "crazyflie": "Whole flights over CRTP, a Crazyflie as its firmware's sources say",
     "firmware_flights": "Whole flights through real Betaflight firmware, nobody helping",
     "firmware_vehicles": "Every vehicle's policies through real Betaflight firmware",
@@ -99,7 +100,8 @@ POLICIES = {
         (
             "many_vehicles", "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify",
             "step_response",
-            "identify_structure", "identify_structure_plain", "mavlink", "crazyflie", "step_alignment", "pad_masks",
+            "identify_structure", "identify_structure_plain", "mavlink", "arducopter", "crazyflie", "step_alignment",
+            "pad_masks",
             "identify_betaflight", "runtime_speed", "msp_fuzz",
             "log_fuzz",
         ),
@@ -188,6 +190,9 @@ parameters are identified. [How it is done](identification.md).""",
     "mavlink": """
 Autopilots that we wrote from the documentation of PX4 and ArduCopter, over our rigid body, in virtual time. No firmware
 flies here. The file has the twenty faults, too. [PX4 and ArduCopter](mavlink.md).""",
+    "arducopter": """
+ArduPilot's own SITL program, which a user brings, over our rigid body behind its JSON interface, in virtual time. The
+file has the faults and the rows of `fly --check`, too. [The real ArduCopter](mavlink.md#the-real-arducopter).""",
     "step_response": """
 VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.

@@ -110,6 +110,7 @@ KINDS = {
     "ros1": run("capture_ros", "capture_ros1"),
     "ros2": run("capture_ros", "capture_ros2"),
     "v4l2": run("capture_video", "capture"),
+    "aigp": run("capture_aigp", "capture"),
     "realsense": run("capture_realsense", "capture"),
     "mask": run("e2efly.flight.sight.mask_source", "capture"),
 }
