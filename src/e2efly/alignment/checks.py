@@ -12,7 +12,12 @@ from e2efly.alignment.clock_checks import on_one_clock, with_clock_rate
 from e2efly.alignment.comparison import continuous, smooth
 from e2efly.alignment.damage_checks import check_columns, with_battery, within_limits, without_frozen
 from e2efly.alignment.frame_checks import in_one_frame, judged_frames
-from e2efly.alignment.rotor_checks import check_commanded_thrust, check_rotor_order, check_rotor_speed_unit
+from e2efly.alignment.rotor_checks import (
+    check_commanded_thrust,
+    check_rotor_count,
+    check_rotor_order,
+    check_rotor_speed_unit,
+)
 from e2efly.alignment.unit_checks import check_force_unit, check_gyro_unit, check_motion_units
 from e2efly.control import Quat
 from e2efly.logs.recording import Record, Stream
@@ -45,6 +50,7 @@ def checked(records: Sequence[Record], vehicle: Vehicle, hovers: bool = False) -
                 f"{record.path}: holds the same numbers as {seen[digest].path}; accepted: each flight once"
             )
         seen[digest] = record
+        check_rotor_count(record, vehicle)
         record = with_battery(within_limits(record))
         check_columns(record)
         check_rotor_speed_unit(record, vehicle)

@@ -42,7 +42,8 @@ def within_limits(record: Record) -> Record:
             unit = "" if KINDS[name].unit == "1" else f" {KINDS[name].unit}"
             worst = float(np.max(np.abs(stream.values)))
             other = next((u for u, f in factors(name).items() if f * worst <= LIMITS[name]), "")
-            hint = f"; in {other}, they would be right: {scaled(name, factors(name)[other])}" if other else ""
+            hint = scaled(name, factors(name)[other], stream.values.shape[1]) if other else ""
+            hint = hint and f"; in {other}, they would be right: {hint}"
             raise ValueError(
                 f"{record.path}: {name} is up to {worst:.4g}{unit}, and beyond what a quadrotor can do in "
                 f"{percent(bad.mean())} of its samples; accepted: up to {LIMITS[name]:g}{unit} (are the units "
@@ -83,13 +84,13 @@ def check_columns(record: Record) -> None:
             continue
         spread = np.ptp(record.streams[name].values, axis=0)
         if np.any(spread == 0):
-            column = KINDS[name].columns[int(np.argmin(spread))]
+            column = KINDS[name].names(len(spread))[int(np.argmin(spread))]
             raise ValueError(
                 f"{record.path}: {column} of {name} never changes; accepted: what was measured in flight, or the log "
                 f"--without {name}"
             )
     for name, stream in record.streams.items():
-        own = KINDS[name].columns
+        own = KINDS[name].names(stream.values.shape[1])
         for i, k in combinations(range(len(own)), 2):
             if np.ptp(stream.values[:, i]) > 0 and np.array_equal(stream.values[:, i], stream.values[:, k]):
                 raise ValueError(

@@ -36,7 +36,15 @@ class Refusal:
     added: float = 0.0
     """If the file has zero, the unit of `sigma`, in the unit of the file's field."""
 
+    limited: float = 0.0
+    """The share of the flights in which rotors at their limits hide it, if that is why."""
+
     def __str__(self) -> str:
+        if self.limited:
+            return (
+                f"{self.unknown.name} is not taken from the flights: {100 * self.limited:.0f} % of them are with a "
+                f"rotor near its limits, or soon after; fly: smaller {self.unknown.fly}"
+            )
         if self.impossible:
             return f"{self.unknown.name} is not taken from the flights: no rigid body has it; fly: {self.unknown.fly}"
         unit = Vehicle.__dataclass_fields__[self.unknown.field].metadata["unit"] if self.unknown.field else "1"

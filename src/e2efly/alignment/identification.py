@@ -8,7 +8,7 @@ import numpy as np
 
 from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.found import FittedPart, Found, estimates_of, is_vague, refusals_of, whole_covariance
+from e2efly.alignment.found import FittedPart, Found, Refusal, estimates_of, is_vague, refusals_of, whole_covariance
 from e2efly.alignment.misfit import LeftOver, widened
 from e2efly.alignment.model import (
     FROM_ZERO,
@@ -18,13 +18,13 @@ from e2efly.alignment.model import (
     from_zero,
     vehicle_of,
 )
-from e2efly.alignment.rotor_response import RESPONSE, responded
+from e2efly.alignment.rotor_response import LITTLE, RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join
 from e2efly.alignment.wrench import solved
 from e2efly.logs.blackbox_merge import DELAY_SIGMA, setpoint_delay
 from e2efly.logs.recording import MOTORS, Record
-from e2efly.vehicles.vehicle import Vehicle
+from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
 
 STRUCTURE = {"thrust_map": 0.002, "inertia": 0.004, "rate_gain": 0.01, "motor_time_constant": 0.01, "latency": 3e-4}
 """Spread of the results between models that differ in properties that no log shows: how often the flight controller
@@ -201,11 +201,18 @@ def identify(
     if driver == "rotor_speed":
         estimates += _yaw(model, found, sigma, impossible, source)
     if driver == "rotor_speed" and all(_drives(record, "command") for record in records):
-        answer, more = _answer(model, records, plain)
+        answer, more, counted = _answer(model, records, plain)
         left += more
         held = np.array([plain and unknown.absent(vehicle) for unknown in RESPONSE])
-        vague = is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held
+        hidden = np.array([counted < LITTLE and unknown.field in RATE_LOOP for unknown in RESPONSE]) & ~held
+        vague = is_vague(vehicle, RESPONSE, answer.p, answer.sigma) & ~held & ~hidden
         refusals += refusals_of(model.base, RESPONSE, answer.sigma, vague)
+        refusals += [
+            Refusal(unknown, float(answer.sigma[i]), limited=1 - counted)
+            for i, unknown in enumerate(RESPONSE)
+            if hidden[i]
+        ]
+        vague |= hidden
         estimates += estimates_of(model.base, RESPONSE, answer.p, answer.sigma, vague | held, source)
         answered = next(((float(e.value), float(e.sigma)) for e in estimates if e.name == "latency"), None)
     if not step:  # with `step`, the fitted delay from command to response is the result
@@ -215,13 +222,13 @@ def identify(
     return Found(model, found, windows, held_out, estimates, refusals, p, sigma, structures, answer, tuple(left))
 
 
-def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[FittedPart, list[LeftOver]]:
-    """What the rotor speeds show of lag, delay and rate loop, and what is left over."""
-    found, left = responded(model, records, plain)
+def _answer(model: Model, records: Sequence[Record], plain: bool) -> tuple[FittedPart, list[LeftOver], float]:
+    """What the rotor speeds show of lag, delay and rate loop, what is left over, and the share of points that count."""
+    found, left, counted = responded(model, records, plain)
     off = np.sqrt(np.maximum(np.diag(found.covariance), np.diag(found.assumed)))
     off = np.hypot(off, [ROTOR_STRUCTURE.get(u.field, 0.0) for u in RESPONSE])
     sigma = widened(left, off, [u.field for u in RESPONSE])
-    return FittedPart(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left
+    return FittedPart(model.base, RESPONSE, found.x, sigma, found.covariance, found.noise), left, counted
 
 
 def _yaw(model: Model, found: Fit, sigma: np.ndarray, impossible: np.ndarray, source: str) -> list[Estimate]:

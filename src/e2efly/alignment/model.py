@@ -108,8 +108,6 @@ FORCE_FILTER = 0.011
 """Time constant of each of the two stages with which a flight controller filters its accelerometer, s. Together they
 have the same delay as Betaflight's own 10 Hz filter. Without this filter, a fit would find a thrust that rises less
 with the motor outputs."""
-START = 16
-"""Length of a window's start: position, velocity, attitude, body rate, rotor speeds (relative to that of hover)."""
 
 
 @jax.tree_util.register_dataclass
@@ -142,6 +140,18 @@ class Model:
         base, told = (jax.tree.map(lambda x: np.asarray(x, np.float64), v) for v in (vehicle, believed))
         names = tuple(u.name for u in UNKNOWNS if _shows(u, base, driver) and (not only or u.name in only))
         return Model(base, told, Mixer.of(believed, np.float64), vehicle.hover_rotor_speed, driver, names)
+
+    @property
+    def start(self) -> int:
+        """Length of a window's start: position, velocity, attitude, body rate, rotor speeds (relative to that of
+        hover).
+        """
+        return 12 + self.base.rotor_count
+
+    @property
+    def width(self) -> int:
+        """Number of the numbers that drive the vehicle, without body rates: of a command, or of its rotors."""
+        return 4 if self.driver == "command" else self.base.rotor_count
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -199,8 +209,8 @@ def value_of(vehicle: Vehicle, field: str) -> Any:
 
 
 def shares(model: Model, q: Array, when: Array) -> Array:
-    """Thrust of each rotor over that of the thrust map, (4,), in a window that begins at this fraction of a flight."""
-    x, y = jnp.sign(model.base.rotor_position).T
+    """Thrust of each rotor over that of the thrust map, (N,), in a window that begins at this fraction of a flight."""
+    x, y = jnp.sign(model.base.rotor_position[:, :2]).T
     sides = jnp.stack([y, -x, jnp.asarray(model.base.rotor_spin)])
     return jnp.exp(q[FACTOR]) * (1 - q[LOST] * when) * (1 + q[UNEVEN] @ sides)
 
@@ -217,7 +227,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
         model: the model to simulate.
         p: unknowns of the vehicle, (u,).
         q: nuisances of the flight, (len(NUISANCES),).
-        start: correction that is added to the measured start of the window, (START,).
+        start: correction that is added to the measured start of the window, (`model.start`,).
         window: `driven`, `when` and the measured start: position, velocity, quaternion, body_rate, rotor_speed.
     """
     vehicle = vehicle_of(model.base, model.unknowns, p)
@@ -230,20 +240,20 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
     }
     spun, earlier = window["rotor_speed"], None
     if model.driver in _MOTORS:  # the start speeds were not measured: simulate them from the outputs before the start
-        earlier = _spinning(plant, jnp.stack(_driven_speed(model, split(before[:, :4]), added), -1))
+        earlier = _spinning(plant, jnp.stack(_driven_speed(model, split(before[:, : model.width]), added), -1))
         spun = earlier[-1]
     first = State(
         window["position"] + start[:3],
         window["velocity"] + start[3:6],
         turned(window["quaternion"], start[6:9]),
         window["body_rate"] + start[9:12],
-        spun + start[12:16] * model.hover,
+        spun + start[12:] * model.hover,
     )
     law, integrate = control_law(COMMAND_MODES["ctbr"]), INTEGRATORS["rk3"]
     controller = model.controller(vehicle)
 
     def advance(parts: Parts, drive: Array) -> tuple[Parts, Parts]:
-        drives = split(drive[:4])
+        drives = split(drive[: model.width])
         if model.driver == "rotor_speed":
             parts = dataclasses.replace(parts, rotor_speed=drives)
             parts = integrate(plant, parts, drives, None, STEP)
@@ -252,7 +262,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
                 model, integrate(plant, parts, _driven_speed(model, drives, added), None, STEP), parts, added
             )
         elif model.driver == "motor_and_rate":
-            parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[4:] - q[GYRO]))
+            parts = dataclasses.replace(parts, body_rate=Vec3.of(drive[model.width :] - q[GYRO]))
             parts = integrate(_without_torque(plant), parts, _driven_speed(model, drives, added), None, STEP)
         else:
             middle, _ = ahead(plant, parts, None, STEP)
@@ -268,7 +278,7 @@ def simulate(model: Model, p: Array, q: Array, start: Array, window: dict[str, A
 
 
 def _spinning(plant: Airframe, asked: Array) -> Array:
-    """Rotor speeds, (t, 4), that follow the requested speeds of each step with a first-order lag. They begin at the
+    """Rotor speeds, (t, N), that follow the requested speeds of each step with a first-order lag. They begin at the
     first requested speeds.
     """
 
@@ -300,13 +310,12 @@ def _driven_speed(model: Model, output: tuple[Array, ...], added: dict[str, Any]
     def thrust(u: Array) -> Array:
         return jnp.maximum(top * (idle + (1 - idle) * u * ((1 - curve) + curve * jnp.abs(u))), model.mixer.thrust_min)
 
-    a, b, c, d = (thrust(u) for u in output)
-    return rotor_speed_for(model.base, (a, b, c, d))
+    return rotor_speed_for(model.base, tuple(thrust(u) for u in output))
 
 
 def _without_torque(plant: Airframe) -> Airframe:
     zero, one = jnp.zeros_like(plant.torque_ratio), jnp.ones_like(plant.specific)
-    arms, ones = (zero, zero, zero, zero), Vec3(one, one, one)
+    arms, ones = (zero,) * len(plant.spin), Vec3(one, one, one)
     return dataclasses.replace(plant, arm_x=arms, arm_y=arms, torque_ratio=zero, inertia=ones, mobility=ones)
 
 
@@ -314,12 +323,12 @@ def _recoiled(model: Model, now: Parts, before: Parts, added: dict[str, Any]) ->
     """The state after a step, with the yaw rate that the rotors' inertia gives the body when their speeds change."""
     gained = jnp.stack(now.rotor_speed) - jnp.stack(before.rotor_speed)
     rate = now.body_rate
-    turned = 10 * added["rotor_inertia"] * (gained @ model.base.rotor_spin) / (2 * model.hover)
+    turned = 10 * added["rotor_inertia"] * (gained @ model.base.rotor_spin) / (model.base.rotor_count / 2 * model.hover)
     return dataclasses.replace(now, body_rate=Vec3(rate.x, rate.y, rate.z + turned))
 
 
 def commanded(delay: Array | float, driven: Array) -> tuple[Array, Array]:
-    """The mean command that acts in each step, a delay, s, after it was sent: (past, 4) before the window, and (m, 4)
+    """The mean command that acts in each step, a delay, s, after it was sent: (past, k) before the window, and (m, k)
     in it. `driven` is the integral of the commands.
 
     Commands from before the window's past are assumed to be the same as at its beginning.
@@ -333,7 +342,7 @@ def commanded(delay: Array | float, driven: Array) -> tuple[Array, Array]:
 
 
 def _sensed(plant: Airframe, parts: Parts, q: Array, earlier: Array | None = None) -> dict[str, Array]:
-    """The simulated sensor readings. The accelerometer passes its filter if the earlier rotor speeds, (past, 4), are
+    """The simulated sensor readings. The accelerometer passes its filter if the earlier rotor speeds, (past, N), are
     known.
     """
     collective, _ = rotor_wrench(plant, met(plant, rotor_thrust(plant, parts.rotor_speed), parts, None))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from e2efly.alignment.comparison import turns
-from e2efly.alignment.model import FACTOR, GYRO, LOST, NUISANCES, POSE_DELAY, START, TILT, Model
+from e2efly.alignment.model import FACTOR, GYRO, LOST, NUISANCES, POSE_DELAY, TILT, Model
 from e2efly.alignment.prediction import off, simulated
 from e2efly.alignment.windows import REACH, STEP, Windows, cut, join
 from e2efly.control.vectors import Quat
@@ -174,7 +174,7 @@ def _prescribed(record: Record) -> Record:
 
 def _flown(model: Model, p: np.ndarray, q: np.ndarray, windows: Windows) -> dict[str, np.ndarray]:
     """As the vehicle flies. The measured attitude is turned by the tilt of the poses' axes."""
-    start = np.zeros(START)
+    start = np.zeros(model.start)
     start[6:8] = -q[TILT]
     return simulated(model, p, np.tile(q, (windows.count, 1)), windows, start)
 

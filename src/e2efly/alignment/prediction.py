@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from e2efly.alignment.found import Found
-from e2efly.alignment.model import NUISANCES, START, Model, attitude_error, simulate
+from e2efly.alignment.model import NUISANCES, Model, attitude_error, simulate
 from e2efly.alignment.shooting import measured_starts
 from e2efly.alignment.windows import STEP, Windows
 
@@ -69,9 +69,9 @@ def simulated(
         p: unknowns of the vehicle, (u,).
         q: nuisances of the flight of each window, (n, len(NUISANCES)).
         windows: the windows.
-        start: correction that is added to each measured start, (START,). If omitted, none.
+        start: correction that is added to each measured start, (`model.start`,). If omitted, none.
     """
-    first = np.zeros(START) if start is None else start
+    first = np.zeros(model.start) if start is None else start
     with jax.enable_x64(True):
         return jax.tree.map(np.asarray, _simulated(model, p, q, first, measured_starts(model, windows)))
 

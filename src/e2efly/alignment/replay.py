@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.alignment.model import NUISANCES, START, Model, attitude_error, commanded, simulate, vehicle_of
+from e2efly.alignment.model import NUISANCES, Model, attitude_error, commanded, simulate, vehicle_of
 from e2efly.alignment.windows import MEASURED, STEP, integral, on_grid, past_steps
 from e2efly.control import COMMAND_MODES
-from e2efly.logs.recording import KINDS, Record
+from e2efly.logs.recording import Record
 from e2efly.simulation.physics.airframe import Airframe
 from e2efly.simulation.physics.control import control_law
 from e2efly.simulation.physics.integrate import lagged
@@ -60,7 +60,7 @@ def stretches(record: Record, begin: Sequence[float] | np.ndarray, length: float
     measured, there = {}, {}
     for name in (name for name in MEASURED if record.has(name)):
         values, good = on_grid(record.streams[name], inside.ravel())
-        measured[name] = values.reshape(*inside.shape, len(KINDS[name].columns))
+        measured[name] = values.reshape(*inside.shape, -1)
         there[name] = good.reshape(inside.shape)
     whole = integral(sent, around.ravel(), held=True).reshape(*around.shape, 4)
     before, _ = on_grid(rates, around[:, :past].ravel())
@@ -87,13 +87,13 @@ def replay(model: Model, p: np.ndarray, flown: Stretches) -> dict[str, np.ndarra
 def _replayed(model: Model, p: Array, windows: dict[str, Any]) -> dict[str, Array]:
     def one(window: dict[str, Any]) -> dict[str, Array]:
         turning = {"rotor_speed": _rotors(model, p, window)}
-        return simulate(model, p, jnp.zeros(len(NUISANCES)), jnp.zeros(START), window | turning)
+        return simulate(model, p, jnp.zeros(len(NUISANCES)), jnp.zeros(model.start), window | turning)
 
     return jax.vmap(one)(windows)
 
 
 def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
-    """Rotor speeds at the start, (4,) rad/s. The motors follow the outputs that the rate loop gives at the measured
+    """Rotor speeds at the start, (N,) rad/s. The motors follow the outputs that the rate loop gives at the measured
     rates.
     """
     vehicle, before = vehicle_of(model.base, model.unknowns, p), window["before"]
@@ -103,7 +103,7 @@ def _rotors(model: Model, p: Array, window: dict[str, Any]) -> Array:
     controller = model.controller(vehicle)
 
     def wanted(rate: Array, command: Array) -> Any:
-        state = State(jnp.zeros(3), jnp.zeros(3), jnp.eye(4)[0], rate, jnp.zeros(4))
+        state = State(jnp.zeros(3), jnp.zeros(3), jnp.eye(4)[0], rate, jnp.zeros(vehicle.rotor_count))
         return law(controller, model.mixer, Parts.of(state), split(command), None)
 
     def follow(speed: Any, seen: tuple[Array, Array]) -> tuple[Any, None]:

@@ -1,9 +1,11 @@
 """Checks rotor speeds, motor outputs and commanded thrust against the vehicle's file, gyroscope and accelerometer."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from e2efly.alignment.comparison import GRID, at_times, common_times, lagged, pearson, smooth
 from e2efly.alignment.unit_checks import AGREE, scaled
@@ -18,6 +20,8 @@ SPEED_OFF, THRUST_OFF = 1.33, 2.0
 is itself off by tens of percent."""
 NEAR, FITS = 0.1, 0.35
 """By how much a ratio may differ from that of a unit, as a logarithm: of rotor speeds, and of thrusts."""
+FOUR = "rear right, front right, rear left, front left"
+"""The order of a quadrotor's rotors."""
 MOVED = 1.0
 """Distance that shows a flight, m."""
 RPM = 30 / np.pi
@@ -27,6 +31,20 @@ SPEEDS = {"rpm": RPM, "revolutions a second": RPM / 60} | {
     for pairs in (7, 6, 8, 11, 12, 14)
 }
 """Other units of rotor speeds: how many of them are one rad/s."""
+
+
+def check_rotor_count(record: Record, vehicle: Vehicle) -> None:
+    """Check that there is a column for each rotor of the vehicle.
+
+    Raises:
+        ValueError: naming the stream, its number of rotors and the vehicle's.
+    """
+    for name in ("rotor_speed", "motor"):
+        if name in record.streams and (size := record.streams[name].values.shape[1]) != vehicle.rotor_count:
+            raise ValueError(
+                f"{record.path}: {name} is of {size} rotors; accepted: {vehicle.rotor_count}, as vehicle "
+                f"{vehicle.name!r} has, the --vehicle that flew, or the log --without {name}"
+            )
 
 
 def check_rotor_speed_unit(record: Record, vehicle: Vehicle) -> None:
@@ -46,7 +64,7 @@ def check_rotor_speed_unit(record: Record, vehicle: Vehicle) -> None:
     if flying.sum() < 20:
         return
     k2, k1, k0 = vehicle.thrust_map
-    each = float(np.mean(force[flying])) * vehicle.mass / 4
+    each = float(np.mean(force[flying])) * vehicle.mass / vehicle.lift
     ratio = float(np.mean(turning[flying]) / ((-k1 + np.sqrt(k1**2 + 4 * k2 * max(each - k0, 0.0))) / (2 * k2)))
     if 1 / SPEED_OFF < ratio < SPEED_OFF:
         return
@@ -57,11 +75,11 @@ def check_rotor_speed_unit(record: Record, vehicle: Vehicle) -> None:
         return  # the rotors may idle on the ground
     unit = min(SPEEDS, key=lambda u: abs(np.log(ratio / SPEEDS[u])))
     fits = abs(np.log(ratio / SPEEDS[unit])) < NEAR
+    option = scaled("rotor_speed", 1 / (SPEEDS[unit] if fits else ratio), vehicle.rotor_count)
     raise ValueError(
         f"{record.path}: rotor_speed is {ratio:.3g} times what gives the thrust of this flight by the vehicle's file: "
         f"it looks like {unit if fits else 'another unit, or another vehicle'}; accepted: rad/s "
-        f"({scaled('rotor_speed', 1 / (SPEEDS[unit] if fits else ratio))}), the --vehicle that flew, or the log "
-        "--without rotor_speed"
+        f"({option}), the --vehicle that flew, or the log --without rotor_speed"
     )
 
 
@@ -84,7 +102,7 @@ def check_commanded_thrust(record: Record, vehicle: Vehicle) -> Record:
         given = float(np.mean(force.values[inside, 2])) if inside.any() else GRAVITY
     held = float(np.average(asked[:-1], weights=np.diff(stream.time)))
     ratio = held / max(given, 1e-9)
-    top = 4 * float(vehicle.rotor_thrust_max) / float(vehicle.mass)
+    top = vehicle.lift * float(vehicle.rotor_thrust_max) / float(vehicle.mass)
     units = {"N": float(vehicle.mass), "g": 1 / GRAVITY}
     if np.all(np.abs(asked) <= 1.05):
         units["0 to 1 of the largest thrust"] = 1 / top
@@ -121,23 +139,34 @@ def check_rotor_order(record: Record, vehicle: Vehicle) -> None:
     thrust = at_times(rotors, grid)
     thrust = smooth(thrust**2 if name == "rotor_speed" else _answering(thrust, vehicle))
     turn = np.gradient(w, GRID, axis=0)[:, :2]
-    x, y = vehicle.rotor_position.T
+    x, y = vehicle.rotor_position[:, :2].T
 
     def seen(order: tuple[int, ...]) -> np.ndarray:
         torque = np.stack([thrust[:, order] @ y, -thrust[:, order] @ x], -1)
         return np.array([pearson(torque[:, i], turn[:, i]) for i in range(2)])
 
-    usual = seen((0, 1, 2, 3))
-    best = max(permutations(range(4)), key=lambda order: float(seen(order).sum()))
+    usual = seen((*range(len(x)),))
+    best = max(_orders(thrust, turn, x, y), key=lambda order: float(seen(order).sum()))
     if np.all(seen(best) > SEEN) and seen(best).sum() > 1.4 * max(float(usual.sum()), 0.0):
-        columns = KINDS[name].columns
+        columns = KINDS[name].names(len(x))
         listed = ", ".join(columns[i] for i in best)
         first, other = next((columns[i], columns[k]) for i, k in enumerate(best) if i != k)
         raise ValueError(
             f"{record.path}: {name} does not turn the vehicle as its geometry says; the columns fit it in the order "
             f"{listed}; "
-            f"accepted: rear right, front right, rear left, front left (--columns OURS=THEIRS, as {first}={other})"
+            f"accepted: {FOUR if len(x) == 4 else 'the order of its file'} (--columns OURS=THEIRS, as {first}={other})"
         )
+
+
+def _orders(thrust: np.ndarray, turn: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterable[tuple[int, ...]]:
+    """The orders of the columns to look at: of four rotors all; of more the one whose torques go best with the angular
+    accelerations, by their covariances, and the file's.
+    """
+    if len(x) == 4:
+        return permutations(range(4))
+    with_turn = (thrust - thrust.mean(0)).T @ (turn / turn.std(0))
+    _, order = linear_sum_assignment(-(np.outer(y, with_turn[:, 0]) - np.outer(x, with_turn[:, 1])))
+    return (*range(len(x)),), tuple(int(i) for i in order)
 
 
 def _answering(outputs: np.ndarray, vehicle: Vehicle) -> np.ndarray:

@@ -5,6 +5,7 @@ speeds compared. The vehicle's inertia and its air do not matter. The mean of th
 whatever the rate loop is like: it gives lag and delay. Their differences give the gains.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -33,6 +34,11 @@ LIMITED = 0.1
 """Share of a rotor's range within which it counts as limited."""
 QUICKEST = 1e-5
 """Smallest time constant of the gyroscope's filter, s: none."""
+LITTLE = 0.3
+"""Share of the points that count below which they do not show the rate loop: rotors at their limits hide it."""
+MOST, ELSEWHERE = 25, (-0.02, 0.02)
+"""Largest number of iterations of the fit, and by how much its first delay is moved, s, in others that are made if it
+does not settle within them, or has little to go by."""
 SMOOTHED = 0.01
 """Typical time constant of the filter of the commanded rates whose derivative is fed forward, s."""
 _FLY = "steps of thrust and body rate, logged at 200 Hz or more, with the times at which commands were sent"
@@ -75,7 +81,7 @@ def measurements(model: Model, records: Sequence[Record]) -> tuple[dict[str, Any
         speeds, near = on_grid(record.streams["rotor_speed"], around[:, past:].ravel())
         driven = integral(record.streams["command"], around.ravel(), held=True)
         n = len(begin)
-        speeds = speeds.reshape(n, -1, 4)
+        speeds = speeds.reshape(n, -1, model.base.rotor_count)
         free = _free(model, speeds) & _whole(record.streams["body_rate"], around[:, past:])
         free = np.logical_and.accumulate(free, axis=1)
         parts.append({
@@ -83,15 +89,19 @@ def measurements(model: Model, records: Sequence[Record]) -> tuple[dict[str, Any
             "rate": rates.reshape(n, -1, 3) - gyro_bias(record),
             "speed": speeds,
             "turning": _turning(model, speeds[:, 1:]),
+            "free": free[:, 1:].astype(float),
             "there": (near.reshape(n, -1) & free)[:, past:].astype(float),
         })  # fmt: skip
     data = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return data, {"mean": data["there"], "difference": np.repeat(data["there"], 3, axis=1)}
 
 
-def responded(model: Model, records: Sequence[Record], plain: bool = False) -> tuple[Solution, list[LeftOver]]:
-    """The unknowns of `RESPONSE`, and what is left over. `plain`: the vehicle has nothing that its file lacks."""
+def responded(model: Model, records: Sequence[Record], plain: bool = False) -> tuple[Solution, list[LeftOver], float]:
+    """The unknowns of `RESPONSE`, what is left over, and the share of the points that count. `plain`: the vehicle has
+    nothing that its file lacks.
+    """
     data, there = measurements(model, records)
+    counted = float(there["mean"].mean())
     prior = np.array([u.prior for u in RESPONSE])
     least = np.full(len(RESPONSE), -np.inf)
     names = [u.name for u in RESPONSE]
@@ -102,9 +112,19 @@ def responded(model: Model, records: Sequence[Record], plain: bool = False) -> t
     start[quick] = max(least[quick], 0.0) + 1e-3
 
     held = np.array([plain and (u.absent(model.base) or u.name.startswith("feed_forward")) for u in RESPONSE])
+
+    def found_from(more: float) -> Solution:
+        begin = start + more * np.array([u.name == "latency" for u in RESPONSE])
+        return solve(_residuals, (model, np.asarray(plain), data), there, begin, prior, FLOOR, least, held, MOST)
+
+    def spread(found: Solution) -> float:
+        return sum(float(there[name].sum()) * math.log(noise) for name, noise in found.noise.items())
+
     with jax.enable_x64(True):
-        found = solve(_residuals, (model, np.asarray(plain), data), there, start, prior, FLOOR, least, held)
-    return found, [_left_over(name, found, data) for name in found.left]
+        found = found_from(0.0)
+        if found.iterations >= MOST or counted < LITTLE:  # the delay moves on by whole steps
+            found = min(found, *(found_from(more) for more in ELSEWHERE), key=spread)
+    return found, [_left_over(name, found, data) for name in found.left], counted
 
 
 def _left_over(name: str, found: Solution, data: dict[str, Any]) -> LeftOver:
@@ -135,15 +155,15 @@ def _of_window(model: Model, x: Array, window: dict[str, Any]) -> dict[str, Arra
     past = past_steps()
     spun = _rotors(model, x, window)[past:]
     off = (spun - window["speed"][past:]) * window["there"][:, None]
-    a, b = jnp.sign(model.base.rotor_position).T
-    turns = off @ jnp.stack([b, -a, jnp.asarray(model.base.rotor_spin)], -1) / 4
+    a, b = jnp.sign(model.base.rotor_position[:, :2]).T
+    turns = off @ jnp.stack([b, -a, jnp.asarray(model.base.rotor_spin)], -1) / model.base.rotor_count
     # what the rotors do for a torque that does not change, such as of a centre of mass, is not the rate loop's
     mean = jnp.sum(turns, 0) / jnp.maximum(jnp.sum(window["there"]), 1.0)
     return {"mean": jnp.mean(off, -1), "difference": ((turns - mean) * window["there"][:, None]).ravel()}
 
 
 def _rotors(model: Model, x: Array, window: dict[str, Any]) -> Array:
-    """Rotor speeds from one reach before a window to its end, (past + m + 1, 4) rad/s."""
+    """Rotor speeds from one reach before a window to its end, (past + m + 1, N) rad/s."""
     vehicle = vehicle_of(model.base, RESPONSE, x)
     named = dict(zip((u.name for u in RESPONSE), x, strict=True))
     believed, mixer, past = model.believed, model.mixer, past_steps()
@@ -176,28 +196,30 @@ def _rotors(model: Model, x: Array, window: dict[str, Any]) -> Array:
         rest = (summed + total) * 0.5 + change * named["feed_forward"]
         old, new = (asked(c[0], gain.times(Vec3.of(c[1:]) - felt) + rest, felt) for c in seen[:2])
         scale = jnp.exp(named["command_scale"])
-        a, b, c, d = (scale * (was * part + now * (1 - part)) for was, now in zip(old, new, strict=True))
-        now = lagged(speed, (a, b, c, d), decay, slowing)
+        driven = tuple(scale * (was * part + now * (1 - part)) for was, now in zip(old, new, strict=True))
+        now = lagged(speed, driven, decay, slowing)
         return (now, after, led, total), jnp.stack(now)
 
-    # The torque of a centre of mass or of uneven rotors stands in the integral part from before the window.
+    # The torque of a centre of mass or of uneven rotors stands in the integral part from before the window. Rotors at
+    # their limits do not show it.
     first, rates = Vec3.of(window["rate"][0]), (window["rate"][1:] + window["rate"][:-1]) / 2
     error = command[:, 1:] - rates
     summed = vehicle.rate_integral_gain * jnp.cumsum(error, axis=0) * STEP
-    held = jnp.mean(window["turning"] - vehicle.rate_gain * error - summed, axis=0)
+    stands = (window["turning"] - vehicle.rate_gain * error - summed) * window["free"][:, None]
+    held = jnp.sum(stands, axis=0) / jnp.maximum(jnp.sum(window["free"]), 1.0)
     start = split(window["speed"][0]), first, Vec3.of(command[0, 1:]), Vec3.of(held)
     _, later = jax.lax.scan(follow, start, (earlier, command, window["rate"][:-1], window["rate"][1:]))
     return jnp.concatenate([window["speed"][:1], later])
 
 
 def _turning(model: Model, speed: np.ndarray) -> np.ndarray:
-    """The angular acceleration, (..., 3) rad/s^2, that rotor speeds, (..., 4), give the flight controller's vehicle."""
+    """The angular acceleration, (..., 3) rad/s^2, that rotor speeds, (..., N), give the flight controller's vehicle."""
     wrench = _thrust(model, speed) @ allocation_matrix(model.believed).T
     return wrench[..., 1:] / np.asarray(model.believed.inertia)
 
 
 def _free(model: Model, speed: np.ndarray) -> np.ndarray:
-    """Where no rotor, (..., 4), is near its limits."""
+    """Where no rotor, (..., N), is near its limits."""
     thrust, low, high = _thrust(model, speed), model.mixer.thrust_min, model.mixer.thrust_max
     margin = LIMITED * (high - low)
     return np.asarray(((thrust > low + margin) & (thrust < high - margin)).all(-1))

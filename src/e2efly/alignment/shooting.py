@@ -23,7 +23,6 @@ from e2efly.alignment.model import (
     FORCE,
     GYRO,
     NUISANCES,
-    START,
     WIND,
     Model,
     attitude_error,
@@ -48,8 +47,8 @@ controller mainly reacts to disturbances, and only the lively windows show the v
 JUDGES = (("body_rate",), ("rotor_speed",), ("velocity", "specific_force", "position"))
 """Sensors that judge the fit: of each group the first that was measured. The velocity is the sum of the specific force,
 without the accelerometer's own faults. The attitude follows from the body rates."""
-FREE = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3 + [0.3] * 4)
-"""Standard deviations of a window's start about the measured start."""
+FREE, FREE_ROTOR = np.array([0.05] * 3 + [0.5] * 3 + [0.1] * 3 + [0.5] * 3), 0.3
+"""Standard deviations of a window's start about the measured start: of the body, and of each rotor."""
 SPUN = 0.003
 """The same for rotor speeds that follow from the motor outputs before the window. If it were larger, disturbances would
 be explained by rotors that have not settled yet, and the motor lag by the duration of the disturbances."""
@@ -132,10 +131,10 @@ def _fit(
     if model.driver in ("motor", "motor_and_rate"):
         least[[x.field == "latency" for x in unknowns]] = -float(model.base.latency)
     least[from_zero(model.base, unknowns) > 0] = 0.0
-    q, starts = np.zeros((flights, v)), np.zeros((windows.count, START))
+    q, starts = np.zeros((flights, v)), np.zeros((windows.count, model.start))
     noise = {name: NOISE[name] for name in windows.measured}
     data = _data(model, windows)
-    free = FREE.copy()
+    free = _free(model)
     if model.driver in ("motor", "motor_and_rate"):
         free[12:] = SPUN
     if "velocity" not in windows.measured and "position" not in windows.measured:
@@ -214,8 +213,13 @@ def cost(model: Model, windows: Windows, p: np.ndarray) -> float:
     """The cost of the windows at `p`, with their measured starts."""
     with jax.enable_x64(True):
         noise = {name: NOISE[name] for name in windows.measured}
-        q, starts = np.zeros((int(windows.flight.max()) + 1, len(NUISANCES))), np.zeros((windows.count, START))
-        return float(np.sum(_at(model, _data(model, windows), FREE, _costs, p, q, starts, noise)["cost"]))
+        q, starts = np.zeros((int(windows.flight.max()) + 1, len(NUISANCES))), np.zeros((windows.count, model.start))
+        return float(np.sum(_at(model, _data(model, windows), _free(model), _costs, p, q, starts, noise)["cost"]))
+
+
+def _free(model: Model) -> np.ndarray:
+    """Standard deviations of a window's start, (`model.start`,)."""
+    return np.concatenate([FREE, np.full(model.base.rotor_count, FREE_ROTOR)])
 
 
 def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> Any:
@@ -229,10 +233,10 @@ def _by_batch(computed: Callable[[Any], Any], data: dict[str, np.ndarray]) -> An
 
 def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
     """The arrays of all windows, padded to whole batches, with a guess of each window's start."""
-    n, hover = windows.count, float(model.hover)
+    n = windows.count
     full = -(-n // BATCH) * BATCH
     data: dict[str, Any] = {"driven": windows.driven, "when": windows.when, "flight": windows.flight}
-    data |= {f"start/{name}": guess for name, guess in _guesses(windows, hover).items()}
+    data |= {f"start/{name}": guess for name, guess in _guesses(windows, model).items()}
     for name in windows.measured:
         data[f"measured/{name}"], data[f"there/{name}"] = windows.measured[name], windows.there[name]
     data["counts"] = np.ones(n)
@@ -241,14 +245,17 @@ def _data(model: Model, windows: Windows) -> dict[str, np.ndarray]:
 
 def measured_starts(model: Model, windows: Windows) -> dict[str, np.ndarray]:
     """The `window` argument of `simulate` for each of the windows, with their measured starts."""
-    return {"driven": windows.driven, "when": windows.when} | _guesses(windows, float(model.hover))
+    return {"driven": windows.driven, "when": windows.when} | _guesses(windows, model)
 
 
-def _guesses(windows: Windows, hover: float) -> dict[str, np.ndarray]:
+def _guesses(windows: Windows, model: Model) -> dict[str, np.ndarray]:
     """The start of each window from its streams. A missing stream is replaced by the values of a hovering vehicle."""
     n, found = windows.count, {}
-    for name, size in (("position", 3), ("velocity", 3), ("quaternion", 4), ("body_rate", 3), ("rotor_speed", 4)):
-        default = np.full(size, hover) if name == "rotor_speed" else np.eye(4)[0] if size == 4 else np.zeros(size)
+    zero = np.zeros(3)
+    for name, default in (
+        ("position", zero), ("velocity", zero), ("quaternion", np.eye(4)[0]), ("body_rate", zero),
+        ("rotor_speed", np.full(model.base.rotor_count, float(model.hover))),
+    ):  # fmt: skip
         found[name] = np.tile(default, (n, 1))
         if name in windows.start:
             seen = np.isfinite(windows.start[name]).all(1)
@@ -268,7 +275,7 @@ def _at(
 ) -> dict[str, np.ndarray]:
     """What `_costs` or `_slopes` says of each window at these unknowns, nuisances and starts."""
     n = len(starts)
-    moved = np.concatenate([starts, np.zeros((len(data["counts"]) - n, START))])
+    moved = np.concatenate([starts, np.zeros((len(data["counts"]) - n, model.start))])
     found = _by_batch(partial(program, model, p, q, noise, free), {**data, "moved": moved})
     return {k: x[:n] for k, x in found.items()}
 

@@ -24,9 +24,9 @@ LIKELY = {
 """Other units in which logs have a stream."""
 
 
-def scaled(name: str, factor: float) -> str:
-    """The option that multiplies a stream by a factor."""
-    entries = " ".join(f"{column}={column}*{factor:.6g}" for column in KINDS[name].columns)
+def scaled(name: str, factor: float, size: int = 4) -> str:
+    """The option that multiplies a stream, of a vehicle with this number of rotors, by a factor."""
+    entries = " ".join(f"{column}={column}*{factor:.6g}" for column in KINDS[name].names(size))
     return f"--columns {entries}, in a CSV file with its own names behind the ="
 
 

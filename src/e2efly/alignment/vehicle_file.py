@@ -53,7 +53,7 @@ def write_vehicle(
     vehicle, table = merged(base, found), read_table(vehicle_file(base_name))
     lines = [
         f"# {path.stem}: identified by e2efly, from {base.name}. Every entry: value, unit and source; sigma is the",
-        "# standard deviation, nan where it is not known. Rotors in Betaflight's order. Body frame FLU.",
+        f"# standard deviation, nan where it is not known. Rotors in {_order(base)} order. Body frame FLU.",
     ]
     lines += [f"{MIXER} = {_text(vehicle.mixer)}"] if vehicle.mixer else []
     for f in quantities(vehicle):
@@ -70,6 +70,10 @@ def write_vehicle(
         lines += [*(f"    {_toml(row, digits=4)}," for row in matrix), "]"]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
     return vehicle
+
+
+def _order(base: Vehicle) -> str:
+    return "Betaflight's" if base.rotor_count == 4 else f"{base.name}'s"
 
 
 def _with_older(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from e2efly.logs.recording import KINDS, Record, Stream
+from e2efly.logs.recording import Record, Stream
 
 STEP = 0.004
 """Time between two points of the grid, s. It is short enough for the physics to be accurate (docs/physics.md)."""
@@ -34,8 +34,8 @@ class Windows:
     begin: np.ndarray
     """(n,) start of each window, s of its record's clock."""
     driven: np.ndarray
-    """(n, past + m + 1, 4) integral over time of the stream that drives the vehicle: commands, motor outputs or rotor
-    speeds. With motor_and_rate, the body rates are appended: 7 columns."""
+    """(n, past + m + 1, k) integral over time of the stream that drives the vehicle: commands (k is 4), motor outputs
+    or rotor speeds (one for each rotor). With motor_and_rate, the body rates are appended."""
     measured: dict[str, np.ndarray]
     """Measurements by stream, (n, m + 1, k). Zero where nothing was measured."""
     there: dict[str, np.ndarray]
@@ -110,7 +110,7 @@ def cut(record: Record, driver: str, flight: int = 0, volts: float | None = None
 
 
 def _driving(record: Record, driver: str, volts: float | None) -> Stream:
-    """The stream that drives the simulation, (n, 4), or (n, 7) with the body rates."""
+    """The stream that drives the simulation, (n, k)."""
     if driver not in ("motor", "motor_and_rate"):
         return record.streams[driver]
     stream = record.streams["motor"]
@@ -132,7 +132,7 @@ def join(parts: Sequence[Windows]) -> Windows:
 
     measured, there, start = {}, {}, {}
     for name in names:
-        size = len(KINDS[name].columns)
+        size = next(part.measured[name].shape[-1] for part in parts if name in part.measured)
         measured[name] = np.concatenate([part.measured.get(name, nothing(part, size)) for part in parts])
         there[name] = np.concatenate([part.there.get(name, nothing(part)) for part in parts])
         unknown = np.full((1, size), np.nan)

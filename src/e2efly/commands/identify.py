@@ -18,7 +18,7 @@ from e2efly.config.storage import finite, held, write_json
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import load_posterior
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.vehicles.vehicle_rules import check_quadrotor
+from e2efly.vehicles.vehicle_rules import check_level
 
 if TYPE_CHECKING:
     from e2efly.alignment.estimates import Estimate
@@ -79,7 +79,7 @@ def _identify(options: Identify) -> int:
     if options.read.columns and not used:
         raise ValueError(f"--columns is {list(options.read.columns)}; accepted: with a source of {', '.join(known)}")
     base, reading = load_vehicle(options.vehicle), options.read.reading(used)
-    check_quadrotor(base, "identify")
+    check_level(base, "identify")
     said: list[Estimate] = []
     if options.mass:
         said.append(weighed(options.mass))

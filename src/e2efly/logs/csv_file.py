@@ -29,13 +29,17 @@ WIDEST = 2000
 """Largest number of columns."""
 HEAD = 1 << 16
 """Bytes at the beginning of a file that show what it is."""
-COLUMNS = (TIME, *(name for kind in KINDS.values() for name in kind.columns))
+COLUMNS = (TIME, *(name for kind in KINDS.values() for name in kind.known))
 """All known columns."""
+_USUAL = (TIME, *(name for kind in KINDS.values() for name in kind.columns))
+"""Those of a quadrotor."""
 UNIT = {TIME: "s"} | {
     column: unit
     for kind in KINDS.values()
     for column, unit in zip(
-        kind.columns, ["m/s^2", *["rad/s"] * 3] if len(kind.unit.split(",")) > 1 else [kind.unit] * 4, strict=False
+        kind.known,
+        ["m/s^2", *["rad/s"] * 3] if len(kind.unit.split(",")) > 1 else [kind.unit] * len(kind.known),
+        strict=True,
     )
 }
 """The unit of each column."""
@@ -125,12 +129,13 @@ def read_csv(path: Path, columns: Mapping[str, Column] | None = None) -> Record:
     for name, kind in KINDS.items():
         if kind.columns[0] not in numbers:
             continue
-        values = np.stack([numbers[column] for column in kind.columns], -1)
+        columns_of = [column for column in kind.known if column in numbers]
+        values = np.stack([numbers[column] for column in columns_of], -1)
         there = np.isfinite(values).all(-1)
         if there.any():
             streams[name] = Stream(time[there], values[there])
         else:
-            notes.append(f"{name} is left out: no line has all of {', '.join(kind.columns)}")
+            notes.append(f"{name} is left out: no line has all of {', '.join(columns_of)}")
     return Record(path, streams, tuple(notes))
 
 
@@ -172,9 +177,9 @@ def write_csv(record: Record, path: Path) -> None:
     for name, kind in KINDS.items():
         if name in record.streams:
             stream = record.streams[name]
-            values = np.full((len(times), len(kind.columns)), np.nan)
+            values = np.full((len(times), stream.values.shape[1]), np.nan)
             values[np.searchsorted(times, stream.time.round(DIGITS))] = stream.values
-            names += kind.columns
+            names += kind.names(stream.values.shape[1])
             columns += list(values.T)
     with path.open("w", newline="", encoding="utf-8") as file:
         lines = csv.writer(file)
@@ -210,14 +215,14 @@ def _places(
     if TIME not in found:
         raise ValueError(f"{path}: has no column 't'; accepted: times in s in a column t, or --columns t=THEIRS")
     for kind in KINDS.values():
-        there = [name for name in kind.columns if name in found]
-        if there and len(there) < len(kind.columns):
-            missing = next(name for name in kind.columns if name not in found)
+        there = [i for i, name in enumerate(kind.known) if name in found]
+        needed = kind.names(max(there[-1] + 1, len(kind.columns))) if there else ()
+        if missing := [name for name in needed if name not in found]:
             raise ValueError(
-                f"{path}: has the column {there[0]} but not {missing}; accepted: {', '.join(kind.columns)}"
+                f"{path}: has the column {kind.known[there[0]]} but not {missing[0]}; accepted: {', '.join(needed)}"
             )
     if len(found) == 1:
-        raise ValueError(f"{path}: knows none of the columns {listed(header)}; accepted: {', '.join(COLUMNS)}")
+        raise ValueError(f"{path}: knows none of the columns {listed(header)}; accepted: {', '.join(_USUAL)}")
     if unused := [text for i, text in enumerate(header) if i not in found.values()]:
         notes.append(f"columns that are not used: {listed(unused, UNUSED)}")
     return found, np.array(factors)

@@ -172,7 +172,7 @@ def _mapped(streams: Mapping[str, Stream], columns: Mapping[str, Column], notes:
     """The streams that `--columns` changes: a factor, or columns of the same stream in another order."""
     changed = {}
     for name, stream in streams.items():
-        own = KINDS[name].columns
+        own = KINDS[name].names(stream.values.shape[1])
         asked = {ours: columns[ours] for ours in own if ours in columns and columns[ours].theirs in own}
         if asked:
             each = [asked.get(ours, Column(ours, 1.0)) for ours in own]

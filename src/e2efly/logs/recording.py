@@ -6,17 +6,30 @@ from pathlib import Path
 
 import numpy as np
 
+from e2efly.vehicles.vehicle import ROTOR_COUNTS
+
 
 @dataclass(frozen=True)
 class StreamKind:
     """One stream that a record may have."""
 
     columns: tuple[str, ...]
-    """Names of its columns in a CSV file."""
+    """Names of its columns in a CSV file; of a value for each rotor, those of a quadrotor."""
     unit: str
     """Unit of the numbers."""
     what: str
     """Description, with the frame."""
+    per_rotor: bool = False
+    """Whether it has as many columns as the vehicle has rotors."""
+
+    def names(self, size: int) -> tuple[str, ...]:
+        """The names of its columns, of a stream with this number of them."""
+        return tuple(f"{self.columns[0][0]}{i + 1}" for i in range(size)) if self.per_rotor else self.columns
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The names of all columns that it may have."""
+        return self.names(ROTOR_COUNTS[-1])
 
 
 KINDS: dict[str, StreamKind] = {
@@ -25,9 +38,12 @@ KINDS: dict[str, StreamKind] = {
     "quaternion": StreamKind(("qw", "qx", "qy", "qz"), "1", "attitude, wxyz, body to world"),
     "body_rate": StreamKind(("wx", "wy", "wz"), "rad/s", "about body x, y, z"),
     "specific_force": StreamKind(("ax", "ay", "az"), "m/s^2", "accelerometer, body: (0, 0, 9.81) at rest"),
-    "rotor_speed": StreamKind(("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file"),
+    "rotor_speed": StreamKind(
+        ("n1", "n2", "n3", "n4"), "rad/s", "in the order of the vehicle's file, and so on with more rotors", True
+    ),
     "motor": StreamKind(
-        ("m1", "m2", "m3", "m4"), "1", "output to each motor, 0 to 1, in the order of the vehicle's file"
+        ("m1", "m2", "m3", "m4"), "1",
+        "output to each motor, 0 to 1, in the order of the vehicle's file, and so on with more rotors", True,
     ),
     "command": StreamKind(
         ("cmd_thrust", "cmd_wx", "cmd_wy", "cmd_wz"), "m/s^2, rad/s",

@@ -97,9 +97,9 @@ def fly_excitation(
         now, then = k / RATE, (k + 1) / RATE
         state = plant.state
         states.append(state)
-        rotors.append(getattr(plant, "rotor_speed", np.full(4, np.nan)))
+        rotors.append(getattr(plant, "rotor_speed", np.full(believed.rotor_count, np.nan)))
         if sag:
-            plant.disturb(np.zeros(3), np.full(4, 1 - sag * now / seconds))
+            plant.disturb(np.zeros(3), np.full(believed.rotor_count, 1 - sag * now / seconds))
         if k % ticks == 0:
             motion = PlantMotion(Vec3(*state.position), Vec3(*state.velocity), Quat(*state.quaternion))
             if steps is not None:

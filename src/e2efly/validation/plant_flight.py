@@ -29,7 +29,7 @@ class FlightSample:
     state: RigidState
     """The vehicle."""
     rotor_speed: np.ndarray
-    """(4,) rad/s. NaN if the plant does not give rotor speeds."""
+    """(N,) rad/s. NaN, (4,), if the plant does not give rotor speeds."""
 
     @staticmethod
     def of(plant: Plant, time: float) -> "FlightSample":

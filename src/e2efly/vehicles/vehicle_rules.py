@@ -48,6 +48,16 @@ def check_quadrotor(vehicle: Vehicle, what: str) -> None:
         )
 
 
+def check_level(vehicle: Vehicle, what: str) -> None:
+    """Refuse tilted rotors, for a part of the program that knows only level ones.
+
+    Raises:
+        ValueError: naming the vehicle, the part and what it accepts.
+    """
+    if vehicle.rotor_axis is not None:
+        raise ValueError(f"vehicle {vehicle.name!r} has tilted rotors; accepted by {what}: level rotors")
+
+
 def check_terms(vehicle: Vehicle, allocation: np.ndarray, weight: float, where: str) -> None:
     """Check the optional terms of the physics that a vehicle has. The allocation is the matrix from rotor thrusts to
     collective thrust and torques, (4, N), and the weight in N. `where` names the vehicle's file in the error text.
