@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from e2efly.courses.tracks import load_track
 from e2efly.flight.pose.gates.association import associated
-from e2efly.flight.pose.gates.error_state import SIZE, ErrorState, SensorNoise, quaternion_of, rotation_of, turned
+from e2efly.flight.pose.gates.error_state import SIZE, AssumedNoise, ErrorState, quaternion_of, rotation_of, turned
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
 from e2efly.flight.pose.gates.gate_setup import GateSetup, load_setup
 from e2efly.flight.pose.gates.gate_source import GateSource
@@ -26,7 +26,7 @@ LENS = Lens(640, 360, (1.5, 1.0), -0.3, (0.1, 0.02, 0.03), 0.016)
 TRACK = load_track("s_shaped")
 OPENINGS = Openings.of(TRACK, 0.05)
 RANDOM = np.random.default_rng(3)
-START = ErrorState.at(0.0, np.array([1.0, 0.3, 1.4]), turned(np.array([0.1, 0.2, 0.1])), SensorNoise())
+START = ErrorState.at(0.0, np.array([1.0, 0.3, 1.4]), turned(np.array([0.1, 0.2, 0.1])), AssumedNoise())
 MOVING = dataclasses.replace(
     START, velocity=np.array([4.0, -1.0, 0.5]), body_rate=np.array([1.0, -2.0, 0.5]), offset=0.01,
     mounting=turned(np.array([0.02, -0.01, 0.03])),
@@ -113,7 +113,7 @@ def test_the_slope_of_the_expected_pixels_is_that_of_finite_differences() -> Non
 
 def test_the_covariance_moves_as_the_errors_do() -> None:
     """Many states that differ by small errors are moved; the spread of where they arrive is the covariance."""
-    noise = SensorNoise(gyro=1e-12, accel=1e-12, gyro_walk=1e-12, accel_walk=1e-12)
+    noise = AssumedNoise(gyro=1e-12, accel=1e-12, gyro_walk=1e-12, accel_walk=1e-12)
     small = dataclasses.replace(MOVING, covariance=1e-6 * np.diag(RANDOM.uniform(0.5, 2, SIZE)))
     gyro, force = np.array([1.2, -2.2, 0.4]), np.array([2.0, 1.0, 14.0])
     after = small.moved(gyro, force, 0.01, noise)
@@ -167,7 +167,7 @@ def test_gates_in_a_row_are_told_apart_from_half_a_metre_off() -> None:
     found = seen_from(truth)
     assert len(found.pixel) >= 8
     for shift in ([0.4, 0.3, 0.1], [-0.3, 0.4, -0.2], [0.2, -0.5, 0.1]):
-        noise = SensorNoise(start=(0.4, 0.1, 0.05), mounting=0.002, offset=1e-3)
+        noise = AssumedNoise(start=(0.4, 0.1, 0.05), mounting=0.002, offset=1e-3)
         off = ErrorState.at(0.0, truth.position + shift, truth.rotation @ turned(np.array([0.02, -0.03, 0.04])), noise)
         told, used = off.corrected(found, lens, OPENINGS, noise)
         assert used >= 6
@@ -177,7 +177,7 @@ def test_gates_in_a_row_are_told_apart_from_half_a_metre_off() -> None:
 def test_corners_that_fit_nowhere_change_no_position_and_raise_the_doubt() -> None:
     found = Corners(np.array([[20.0, 300.0], [600.0, 30.0]]), np.array([[1.0, 0.0], [-1.0, 0.0]]))
     small = dataclasses.replace(START, covariance=1e-4 * START.covariance)
-    told, used = small.corrected(found, LENS, OPENINGS, SensorNoise())
+    told, used = small.corrected(found, LENS, OPENINGS, AssumedNoise())
     assert used == 0
     np.testing.assert_array_equal(told.position, small.position)
     assert told.covariance[0, 0] > small.covariance[0, 0]
@@ -192,7 +192,7 @@ def test_an_ambiguous_corner_is_left_out() -> None:
 
 def flown(offset: float, mounting: float, seconds: float = 12.0) -> tuple[list[float], GateEstimator]:
     """A vehicle that sways in front of gates, whose camera is late and turned; the errors of the estimate, m."""
-    noise = SensorNoise()
+    noise = AssumedNoise()
     lens = dataclasses.replace(LENS, readout=0.0)
     turn = turned(np.array([mounting, -mounting, mounting]) / np.sqrt(3))
 

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from e2efly.config import CameraConfig, ImuConfig
 from e2efly.courses.gates import Gates
 from e2efly.courses.tracks import RaceTrack
-from e2efly.flight.pose.gates.error_state import ErrorState, SensorNoise, quaternion_of, rotation_of, turned
+from e2efly.flight.pose.gates.error_state import AssumedNoise, ErrorState, quaternion_of, rotation_of, turned
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
 from e2efly.flight.pose.gates.lens import Corners, Lens, Openings
 from e2efly.flight.sight.gate_corners import gate_corners
@@ -63,7 +63,7 @@ class GateCamera:
     """Samples per second."""
     bias: tuple[float, float] = (0.01, 0.2)
     """Standard deviations of the constant biases of gyroscope, rad/s, and accelerometer, m/s^2."""
-    noise: SensorNoise = SensorNoise()
+    noise: AssumedNoise = AssumedNoise()
     """What the estimator assumes."""
 
     @property

@@ -39,7 +39,7 @@ EYE = np.eye(3)
 
 
 @dataclass(frozen=True)
-class SensorNoise:
+class AssumedNoise:
     """What the filter assumes of its sensors. More than there is costs little; less makes it deaf."""
 
     gyro: float = 2e-3
@@ -91,8 +91,8 @@ class ErrorState:
     """(19, 19)."""
 
     @staticmethod
-    def at(time: float, position: np.ndarray, rotation: np.ndarray, noise: SensorNoise) -> "ErrorState":
-        """A vehicle that stands at a known place, within `SensorNoise.start`."""
+    def at(time: float, position: np.ndarray, rotation: np.ndarray, noise: AssumedNoise) -> "ErrorState":
+        """A vehicle that stands at a known place, within `AssumedNoise.start`."""
         place, speed, turn = noise.start
         deviation = np.repeat(
             [place, speed, turn, noise.gyro_bias, noise.accel_bias, noise.mounting, noise.offset], [3] * 6 + [1]
@@ -103,7 +103,7 @@ class ErrorState:
             np.diag(deviation**2),
         )  # fmt: skip
 
-    def moved(self, gyroscope: np.ndarray, accelerometer: np.ndarray, dt: float, noise: SensorNoise) -> "ErrorState":
+    def moved(self, gyroscope: np.ndarray, accelerometer: np.ndarray, dt: float, noise: AssumedNoise) -> "ErrorState":
         """The state `dt` s later.
 
         Args:
@@ -146,7 +146,9 @@ class ErrorState:
         rest = np.eye(SIZE) - gain @ slope
         return self._with(gain @ miss, rest @ self.covariance @ rest.T + STILL**2 * gain @ gain.T)
 
-    def corrected(self, found: Corners, lens: Lens, openings: Openings, noise: SensorNoise) -> "tuple[ErrorState, int]":
+    def corrected(
+        self, found: Corners, lens: Lens, openings: Openings, noise: AssumedNoise
+    ) -> "tuple[ErrorState, int]":
         """The state, corrected by the corners of an image with its stamp, and how many of them were used.
 
         The correction is made twice: the second time, the pixels are expected from where the first has led.

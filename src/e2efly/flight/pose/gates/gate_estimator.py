@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from e2efly.flight.pose.gates.error_state import ErrorState, SensorNoise, quaternion_of, turned
+from e2efly.flight.pose.gates.error_state import AssumedNoise, ErrorState, quaternion_of, turned
 from e2efly.flight.pose.gates.lens import Corners, Lens, Openings
 from e2efly.policy.odometry import Odometry
 
@@ -35,7 +35,7 @@ class GateEstimator:
     """The newest state."""
     lens: Lens
     openings: Openings
-    noise: SensorNoise = SensorNoise()
+    noise: AssumedNoise = AssumedNoise()
     seen: float = -np.inf
     """Time of the last image in which a corner was used, s."""
     used: int = 0

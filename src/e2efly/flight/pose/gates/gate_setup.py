@@ -10,14 +10,14 @@ import numpy as np
 
 from e2efly.config.tables import number, numbers, read_table, shown, text
 from e2efly.courses.tracks import RaceTrack, load_track
-from e2efly.flight.pose.gates.error_state import SensorNoise
+from e2efly.flight.pose.gates.error_state import AssumedNoise
 from e2efly.flight.pose.gates.lens import Lens
 from e2efly.policy.images import NONE, Image
 
 FORM = (
     "track, a name or the path of a .toml file; start = [x, y, z, heading] of the vehicle that stands, m and degrees; "
     "[camera] with width, height, fov = [across, down] and pitch in degrees, rate in Hz, and optionally position, m, "
-    "latency and readout, s; [noise] with fields of SensorNoise"
+    "latency and readout, s; [noise] with fields of AssumedNoise"
 )
 _CAMERA = {"width", "height", "fov", "pitch", "rate"}
 _OPTIONAL = {"position", "latency", "readout"}
@@ -38,7 +38,7 @@ class GateSetup:
     """Images per second."""
     latency: float
     """Usual time from the exposure of an image to its arrival, s."""
-    noise: SensorNoise = SensorNoise()
+    noise: AssumedNoise = AssumedNoise()
     """What the estimator assumes of its sensors."""
 
     @property
@@ -87,8 +87,8 @@ def load_setup(path: Path) -> GateSetup:
     )
 
 
-def _noise(path: Path, table: Any) -> SensorNoise:
-    known = {f.name: f for f in dataclasses.fields(SensorNoise)}
+def _noise(path: Path, table: Any) -> AssumedNoise:
+    known = {f.name: f for f in dataclasses.fields(AssumedNoise)}
     if not isinstance(table, dict) or not set(table) <= set(known):
         raise ValueError(f"{path}: noise is {shown(table)}; accepted: {', '.join(known)}")
     values: dict[str, Any] = {}
@@ -98,4 +98,4 @@ def _noise(path: Path, table: Any) -> SensorNoise:
         if not np.all(got > 0):
             raise ValueError(f"{path}: noise.{name} is {shown(value)}; accepted: more than 0")
         values[name] = tuple(got.tolist()) if many else float(got[0])
-    return SensorNoise(**values)
+    return AssumedNoise(**values)
