@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.config.drawing import INK
-from e2efly.flight.pose.gates.gate_corners import gate_corners
+from e2efly.flight.sight.gate_corners import gate_corners
 from e2efly.policy.loader import load_policy
 from e2efly.policy.runtime import Runtime
 from e2efly.policy.zoo import policy_file

@@ -394,7 +394,7 @@ def test_a_plant_is_read_and_its_exceptions_do_not_escape() -> None:
 @pytest.mark.parametrize(
     ("text", "accepted"),
     [
-        ("", "mocap:.*; ros1:/topic; ros2:/topic; tcp:HOST:PORT; udp:PORT .*; or path/to/file.py:Name"),
+        ("", "mocap:.*; ros1:/topic; ros2:/topic; gates:.*; tcp:HOST:PORT; udp:PORT .*; or path/to/file.py:Name"),
         ("serial:9870", "mocap:.*udp:PORT"),
         ("udp:", "udp:PORT or udp:HOST:PORT"),
         ("udp:0", "udp:PORT"),
