@@ -13,7 +13,8 @@ from pathlib import Path
 
 TIMES = ("time_to_criterion", "cold_start", "success", "paper", "rates", "rendering", "mesh_rendering")
 OTHERS = (
-    "many_vehicles", "rate_loop", "runtime_speed", "c_export", "onboard", "msp_fuzz", "log_fuzz", "policy_fuzz",
+    "many_vehicles", "moving_trunks",
+    "rate_loop", "runtime_speed", "c_export", "onboard", "msp_fuzz", "log_fuzz", "policy_fuzz",
     "sim_to_sim", "firmware_flights", "firmware_vehicles",
     "firmware_faults", "command_flights", "controllers", "fault_campaign --publish", "process_faults", "bridge_loop",
     "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
