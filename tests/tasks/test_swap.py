@@ -12,14 +12,15 @@ from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, random_key
 from e2efly.learning.devices import share
 from e2efly.learning.setup import Setup
-from e2efly.policy.others import FAR
+from e2efly.policy.others import FAR, nobody
 from e2efly.runs import presets
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import gaps
 from e2efly.tasks import company
 from e2efly.tasks.swap import SwapConfig
 from e2efly.tasks.swap.goal import SwapGoal, SwapMemory
-from e2efly.tasks.task import at_rest
+from e2efly.tasks.swap.pilot import way
+from e2efly.tasks.task import Flier, at_rest
 from e2efly.viewing.web.exported import course
 
 PERIOD = 1 / 30
@@ -115,6 +116,47 @@ class TestCompany:
         flag = jnp.array([True, False, True, True, False, False])
         assert company.any_of_world(flag, 2).tolist() == [True, True, True, True, False, False]
         assert company.all_of_world(flag, 2).tolist() == [False, False, True, True, False, False]
+
+
+class TestPilot:
+    """The expert, as points that move as it says."""
+
+    def test_nobody_near_is_the_straight_way(self) -> None:
+        flier = Flier.usual(jnp.zeros((2, 3)), jnp.zeros((2, 3)))
+        place = jnp.array([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+        found = way(nobody(flier.position, 2), flier, place, 1.0)
+        np.testing.assert_allclose(found, [[0.6, 0.8, 0.0], [0.0, 0.0, 0.0]], atol=0.05)
+
+    def test_two_that_meet_pass_on_the_right(self) -> None:
+        position, velocity = jnp.array([[-1.0, 0, 2], [1.0, 0, 2]]), jnp.array([[1.0, 0, 0], [-1.0, 0, 0]])
+        both = company.all_others(moving(position, velocity), 2)
+        found = np.asarray(way(both, Flier.usual(position, velocity), position[::-1] * jnp.array([4.0, 1, 1]), 1.0))
+        assert found[0, 1] < -0.2 and found[1, 1] > 0.2  # one flies east, the other west
+
+    def test_eight_exchange_their_places_by_the_two_nearest(self) -> None:
+        env, step = environment(), 0.1
+        state, _ = env.reset(random_key(0), 128)
+        position, velocity, place = state.vehicle.position, jnp.zeros((128, 3)), state.memory.place
+        pilot = jax.jit(
+            lambda body: way(company.nearest(body, 8, 2), Flier.usual(body.position, body.velocity), place, 1.1)
+        )
+        nearest = np.inf
+        for _ in range(90):
+            velocity = pilot(moving(position, velocity))
+            position = position + step * velocity
+            nearest = min(nearest, float(jnp.min(company.squared_distances(position, 8))) ** 0.5)
+        assert nearest > 2 * float(env.task.shape.radius)
+        assert float(jnp.max(jnp.linalg.norm(position - place, axis=-1))) < 0.1
+
+    def test_it_commands_the_vehicle_towards_its_place(self) -> None:
+        env = environment()
+        state, _ = env.reset(random_key(0), 8)
+        begun = jnp.linalg.norm(state.memory.place - state.vehicle.position, axis=-1)
+        step = jax.jit(lambda state: env.step(state, env.expert_action(state), restart=False)[0])
+        for _ in range(60):
+            state = step(state)
+        left = jnp.linalg.norm(state.memory.place - state.vehicle.position, axis=-1)
+        assert np.all(np.asarray(begun - left) > 0.5)
 
 
 class TestSwap:

@@ -142,7 +142,7 @@ def flier(pilot: Vehicle, motion: ExpertMotion, time: Float[Array, " n"]) -> Fli
     most = jnp.minimum(pilot.acceleration_max[..., 0], AGILE)
     lag = jnp.broadcast_to(FOLLOWS / pilot.attitude_gain[..., 0], most.shape)
     level = jnp.stack([per * up.x, per * up.y], axis=-1)
-    return Flier(position, motion.velocity.stack(), level, most, lag, time)
+    return Flier(position, motion.velocity.stack(), level, most, lag, time, motion.attitude.yaw())
 
 
 def command(

@@ -93,14 +93,15 @@ class Flier:
     """Lag of the acceleration behind the commanded one, s."""
     time: Float[Array, " n"]
     """Time in the episode at which it moves so, s."""
+    yaw: Float[Array, " n"]
+    """Its yaw, rad."""
 
     @staticmethod
     def usual(position: Float[Array, "n 3"], velocity: Float[Array, "n 3"], time: float | Array = 0.0) -> "Flier":
-        """A vehicle of usual agility, whose attitude is level."""
+        """A vehicle of usual agility, whose attitude is level, and its yaw 0."""
         n = position.shape[0]
-        return Flier(
-            position, velocity, jnp.zeros((n, 2)), jnp.full(n, AGILE), jnp.full(n, LAG), jnp.broadcast_to(time, (n,))
-        )
+        agile, lag, time = jnp.full(n, AGILE), jnp.full(n, LAG), jnp.broadcast_to(time, (n,))
+        return Flier(position, velocity, jnp.zeros((n, 2)), agile, lag, time, jnp.zeros(n))
 
 
 @runtime_checkable

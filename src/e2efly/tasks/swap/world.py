@@ -15,7 +15,8 @@ from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks import company
 from e2efly.tasks.swap.goal import SwapGoal, SwapMemory
-from e2efly.tasks.task import at_rest, uniform
+from e2efly.tasks.swap.pilot import PACE, nearest_of, way
+from e2efly.tasks.task import Flier, at_rest, uniform
 
 
 @jax.tree_util.register_dataclass
@@ -69,6 +70,13 @@ class Swap(SwapGoal):
         """The others over level ground."""
         balls = company.spheres(memory.bodies, memory.time, self.shape.radius)
         return Scene.of({"sphere": balls}, memory.place.shape[0])
+
+    def expert(self, memory: SwapWorld, flier: Flier) -> tuple[Float[Array, "n 3"], Float[Array, " n"]]:
+        """Velocity, m/s, and yaw, rad, of an expert that knows as many of the nearest others as the policy."""
+        c, bodies, later = self.config, memory.bodies, (flier.time - memory.time)[:, None, None]
+        bodies = dataclasses.replace(bodies, position=bodies.position + later * bodies.velocity)
+        known = nearest_of(bodies, flier.position, min(c.neighbours, c.agents - 1))
+        return way(known, flier, memory.place, PACE * c.speed), flier.yaw
 
     def desired_yaw(self, memory: SwapWorld, state: State) -> Float[Array, " n"]:
         """Along world x."""

@@ -17,7 +17,7 @@ CHANCE = 11.8
 CLUTTER = 1e-4
 """Density of found corners that belong to no opening, 1 / pixel^2."""
 CLEAR = 3.0
-"""Smallest difference of the logarithms of the likelihoods of the best assignment and of one that contradicts it."""
+"""An assignment counts beside the best one if the logarithm of its likelihood is less than this below."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Expected:
 
 def associated(
     expected: Expected, covariance: np.ndarray, found: np.ndarray, alike: np.ndarray, sigma: float
-) -> list[tuple[int, int]]:
+) -> list[tuple[int, int]] | None:
     """Pairs (expected, found).
 
     Args:
@@ -43,11 +43,12 @@ def associated(
         sigma: standard deviation of a found corner, pixels.
 
     Returns:
-        The pairs, each corner at most once. Empty: no assignment is both likely and clear.
+        The pairs, each corner at most once, on which all assignments agree that are nearly as likely as the best one.
+            None: no pair is likely.
     """
     slope, count = expected.slope, len(expected.pixel)
     if not count or not len(found):
-        return []
+        return None
     miss = found[None] - expected.pixel[:, None]  # (k, f, 2)
     cross = slope @ covariance  # (k, 2, s)
     joint = np.einsum("aix,bjx->abij", cross, slope)  # covariance of the pixels of corners a and b
@@ -56,7 +57,7 @@ def associated(
     distance = np.einsum("kfi,kij,kfj->kf", miss, inverse, miss)
     first, second = np.nonzero(alike & (distance < CHANCE))
     if not len(first):
-        return []
+        return None
     gain = joint[:, first].transpose(1, 0, 2, 3) @ inverse[first][:, None]  # (c, k, 2, 2): of pair c on corner k
     shifted = np.einsum("ckij,cj->cki", gain, miss[first, second])
     rest = own[None] - gain @ joint[first]  # (c, k, 2, 2): what remains uncertain
@@ -71,11 +72,10 @@ def associated(
     scores = np.array([score for _, score in assignments]) + prior
     best = int(np.argmax(scores))
     chosen = assignments[best][0]
-    seen, seen_as = dict(chosen), {f: e for e, f in chosen}
     for (pairs, _), score in zip(assignments, scores, strict=True):
-        other = any(seen.get(e, f) != f or seen_as.get(f, e) != e for e, f in pairs)
-        if other and score > scores[best] - CLEAR:
-            return []
+        if score > scores[best] - CLEAR:
+            seen, seen_as = dict(pairs), {f: e for e, f in pairs}
+            chosen = [(e, f) for e, f in chosen if seen.get(e, f) == f and seen_as.get(f, e) == e]
     return chosen
 
 

@@ -30,8 +30,8 @@ ALIKE = 0.75
 PASSES = 2
 """How often an image corrects the state."""
 DOUBT = 1.15
-"""Factor on the standard deviations of the pose after an image in which corners were found and none was expected where
-it is."""
+"""Factor on the standard deviations of the pose after an image in which corners are expected, and none is found where
+one may be."""
 STILL = 0.02
 """Standard deviation of velocity, m/s, and body rate, rad/s, of a vehicle that stands, and of what its sensors say of
 it."""
@@ -156,11 +156,12 @@ class ErrorState:
         if not len(found.pixel):
             return self, 0
         sigma = noise.pixel * lens.focal.mean() / 320.0
-        state, error, used = self, np.zeros(SIZE), 0
+        state, error, used, likely = self, np.zeros(SIZE), 0, True
         expected, inward = self._expected(lens, openings)
         for _ in range(PASSES):
             pairs = associated(expected, state.covariance, found.pixel, inward @ found.inward.T > ALIKE, sigma)
             if not pairs:
+                likely = used > 0 or pairs is not None
                 break
             e, f = np.array(pairs).T
             slope = expected.slope[e].reshape(-1, SIZE)
@@ -171,7 +172,7 @@ class ErrorState:
             error, used = gain @ miss, len(pairs)
             state = self._with(error, rest @ self.covariance @ rest.T + sigma**2 * gain @ gain.T)
             expected, inward = state._expected(lens, openings)
-        if used or not len(expected.pixel):
+        if likely or not len(expected.pixel):
             return state, used
         wider = np.eye(SIZE)
         wider[:9, :9] *= DOUBT
