@@ -20,6 +20,7 @@ import numpy as np
 from e2efly.flight.betaflight.autopilot import Betaflight
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.firmware_gains import gain_lines, gains_of
+from e2efly.flight.betaflight.mixers import mixer_of
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
 from e2efly.flight.betaflight.versions import Release
 from e2efly.flight.link import Link, open_link
@@ -33,7 +34,6 @@ from e2efly.validation.sitl import FirmwareState, Sitl
 from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 STEP_S = 0.002
 """Interval at which the firmware's sensors get a new state, s."""
@@ -137,12 +137,13 @@ class Rig:
         settings: tuple[str, ...] = (),
         pose_noise: tuple[float, ...] = POSE_NOISE,
     ) -> None:
-        check_quadrotor(vehicle, "the rig of the Betaflight firmware")
         compute_at_once()
+        self.motors = list(mixer_of(vehicle).motors)
+        """For each rotor of the vehicle file, its motor in the order of the firmware."""
         self._step = step
         self._settings = (*vehicle_lines(vehicle, firmware.release), *SETTINGS, *settings)
-        self.sitl = Sitl(firmware, folder)
-        self.thrust_shares = np.ones(4)
+        self.sitl = Sitl(firmware, folder, vehicle.rotor_count)
+        self.thrust_shares = np.ones(vehicle.rotor_count)
         """Thrust of each rotor divided by the thrust from the vehicle's thrust map."""
         self.carry(vehicle)
         self.state: FlownBody = self.world.at_rest()
@@ -152,7 +153,7 @@ class Rig:
         self.wind = np.zeros(3)
         self.held = False
         """Whether the body is held in place, so that the rotors do not move it."""
-        self.shares = np.ones(4)
+        self.shares = np.ones(vehicle.rotor_count)
         """Share of each motor's output that its rotor follows. It is below 1 for a flat battery or a weak motor."""
         self.felt: Callable[[FirmwareState], FirmwareState] | None = None
         """Function from the true state to the readings of the firmware's sensors. None: the sensors are exact."""
@@ -169,9 +170,9 @@ class Rig:
         self._open = ExitStack()
 
     def carry(self, vehicle: Vehicle) -> None:
-        """Put a vehicle under the firmware. The state stays the same."""
+        """Put a vehicle under the firmware, with as many rotors as before. The state stays the same."""
         self.world = World(vehicle)
-        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)  # compile while it has all cores
+        self.world.advance(self.world.at_rest(), np.ones(vehicle.rotor_count), STEP_S)  # compile while it has all cores
 
     def __enter__(self) -> "Rig":
         self.start()
@@ -232,7 +233,7 @@ class Rig:
 
     def step(self, dt: float) -> None:
         """Run one step of the world and of the firmware."""
-        motors = self.sitl.motors() if self._on else np.zeros(4)
+        motors = self.sitl.motors()[self.motors] if self._on else np.zeros(len(self.motors))
         after = self.state if self.held else self._moved(motors, dt)
         if self._on:
             sensed = self._shaken(self.world.sensed(self.state, after, dt), after)
@@ -310,10 +311,20 @@ class Rig:
 
 
 def vehicle_lines(vehicle: Vehicle, release: Release) -> tuple[str, ...]:
-    """The firmware's settings for a vehicle: the gains of the rate loop, and the throttle without a receiver."""
+    """The firmware's settings for a vehicle: its mixer, the gains of the rate loop, and the throttle without a
+    receiver.
+
+    Raises:
+        ValueError: if the firmware has no mixer for its rotors.
+    """
     hover = ThrottleCurve().channel_for(ThrottleMap.of(vehicle).throttle(GRAVITY))
     sinks = (hover // FAILSAFE_STEP - 1) * FAILSAFE_STEP
-    return (*gain_lines(gains_of(vehicle), release), f"rxfail 3 s {sinks}", f"set failsafe_throttle={sinks}")
+    return (
+        *mixer_of(vehicle).lines,
+        *gain_lines(gains_of(vehicle), release),
+        f"rxfail 3 s {sinks}",
+        f"set failsafe_throttle={sinks}",
+    )
 
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:
