@@ -26,7 +26,10 @@ from e2efly.validation.plant_validation import validate
 from e2efly.validation.rehearsal import Rehearsal
 from e2efly.vehicles.loading import load_vehicle
 
-VEHICLES = ("vis_r", "vis_h", "crazyflie")
+VEHICLES = ("vis_r", "vis_h", "crazyflie", "hexa", "octo")
+OF_FAMILY = {"hexa": "multirotor", "octo": "multirotor"}
+"""Whose policies fly the vehicles that have none of their own. The firmware drives them by its mixers HEX6X and
+OCTOFLATX."""
 EXPECTED = {"", *map(str, (Reason.POLICY_DONE, Reason.MISSION, Reason.LANDED, Reason.TOUCHED, Reason.DISARMED))}
 """Reasons of the modes after the policy's in a flight that nothing ended."""
 
@@ -51,21 +54,23 @@ def main() -> None:
         write("firmware_vehicles", args.json, {"table": rows_of(flights, starts), "flights": flights, "starts": starts})
 
     for vehicle in args.vehicles:
-        for task in [task for task in contents()[vehicle] if args.tasks == [""] or task in args.tasks]:
+        whose = OF_FAMILY.get(vehicle) or vehicle
+        for task in [task for task in contents()[whose] if args.tasks == [""] or task in args.tasks]:
             pair = {"vehicle": vehicle, "task": task}
             for seed in range(args.seed, args.seed + args.flights):
                 if any(pair.items() <= row.items() and row["seed"] == seed for row in flights):
                     continue
-                found = candidate(task, vehicle)
+                found = candidate(f"{whose}/{task}", vehicle)
                 (flight,) = fly_whole(found, load_vehicle(vehicle), 1, Console(quiet=True), seed)
                 flights.append({**pair, "seed": seed, "alarms": alarms_of(flight), **flight_row(flight)})
                 keep()
                 print(vehicle, task, seed, flight.complete, flight.success, flight.told, alarms_of(flight), flush=True)
             if args.episodes and not any(pair.items() <= row.items() for row in starts):
-                report = validate(f"{vehicle}/{task}", "betaflight", args.episodes).as_json()["criteria"]
+                other = None if whose == vehicle else vehicle
+                told = validate(f"{whose}/{task}", "betaflight", args.episodes, vehicle=other).as_json()["criteria"]
                 starts += [
                     {**pair, "criterion": name, **{k: one[k]["success"] for k in ("training", "betaflight")}}
-                    for name, one in report.items()
+                    for name, one in told.items()
                 ]
                 keep()
     print(table(rows_of(flights, starts)))

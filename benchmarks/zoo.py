@@ -68,6 +68,8 @@ ALONE = {
     "race_duel": USUAL, "hover_rotors": presets.FAMILY,
 }  # fmt: skip
 """For this vehicle alone."""
+FRAMES = "multirotor"
+"""The family that has a policy of hover alone."""
 SEEING = (USUAL, "vis_h", presets.FAMILY)
 """Vehicles that have policies by sight: the paper's, one with a camera and one in virtual worlds, and any."""
 PER_ROW = 250
@@ -292,6 +294,8 @@ def main() -> None:
             if vehicle != ALONE.get(task, vehicle):
                 continue
             if task in TASKS and TASKS[task].cameras and vehicle not in SEEING:
+                continue
+            if vehicle == FRAMES and task != "hover":
                 continue
             if vehicle in family_names() and algorithms(task)[0] not in TASKS[recipe(vehicle, task)[0]].family:
                 continue

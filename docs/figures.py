@@ -47,6 +47,7 @@ TITLES = {
     "success": "Success over 1000 unseen starts, full presets",
     "ablation": "The reward ablation, from process start, empty cache",
     "robust": "The preset robust: seconds from process start, cold, and success under stress",
+    "multirotor": "One policy for frames of 4 to 8 rotors, tilted and lopsided: 1000 unseen ones, by rotors",
     "any_vehicle": "One policy for any quadrotor: 1000 unseen vehicles, by delay, and the vehicles that ship",
     "raptor": "One policy for any quadrotor, beside RAPTOR: 1000 unseen vehicles, by delay",
     "zoo_stress": "The zoo under stress: vehicles, air and sensors that are not those of the training",
@@ -91,6 +92,7 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
+            "multirotor",
             "firmware_vehicles", "room_flights", "controllers", "filter", "plants_by_sight", "image_faults",
             "hil_rehearsal", "hil_room", "fault_campaign", "onboard", "c_export", "race_speed",
         ),
@@ -249,6 +251,11 @@ The fence is 5.6 x 5.6 x 2.7 m, 0.2 m before the walls; it would end a policy's 
 leaves it. *Flown space*: the box of all true positions of the five flights, from take-off to landing. The races
 fly three laps of `room_6`, and the fastest is told the highest of 8, 7, 6, 5 and 4 m/s at which all five
 flights succeed. The others fly what `e2efly fly` flies without further options.""",
+    "multirotor": """
+A success is within 0.1 m for the last second of 8 s. *Straightened*: the frames of the family. *As drawn*: those that
+its law draws before it straightens what does not hover by the thrusts of smallest norm. *Feasible*: what a linear
+programme calls so: it hovers level, with a tenth of weight times arm of roll and pitch torque to spare, and a tenth of
+weight times torque ratio of yaw torque.""",
     "firmware_vehicles": """
 Five to ten whole flights each: take-off, the task, landing, nobody helping. *Starts*: success in 20 of `e2efly validate
 --plant betaflight`, in the simulator and behind the firmware. The firmware has the gains that each vehicle's file asks

@@ -43,6 +43,7 @@ TASKS = {
 VEHICLES = {
     "any": "Any quadrotor",
     "crazyflie": "Crazyflie",
+    "multirotor": "Any multirotor of four to eight rotors",
     "vis_h": "VIS-H",
     "vis_r": "VIS-R",
 }

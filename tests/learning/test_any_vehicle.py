@@ -46,35 +46,39 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def family() -> Family:
-    found = load_family("any")
+def family(name: str = "any") -> Family:
+    found = load_family(name)
     assert found is not None
     return found
 
 
-def vehicle_of(u: np.ndarray) -> Vehicle:
-    return _loaded(family().draw(np.asarray(u, np.float64)), "any")
+def vehicle_of(u: np.ndarray, name: str = "any") -> Vehicle:
+    return _loaded(family(name).draw(np.asarray(u, np.float64)), name)
 
 
 def environment(**options: object) -> Env:
     config = presets.preset("hover", "bptt")
-    return Env.of(config.task, config.reward, dataclasses.replace(config.env, vehicle="any", **options))
+    return Env.of(config.task, config.reward, dataclasses.replace(config.env, **{"vehicle": "any"} | options))
 
 
-@pytest.mark.whole(but=1)
-@pytest.mark.parametrize("mode", ["ctbr", "rotor_share", "rotor_speed"])
-def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(mode: str) -> None:
-    """Plant, mixer and rate loop of each are those of the vehicle that was drawn."""
-    env, rng = environment(command_mode=mode), np.random.default_rng(0)
+@pytest.mark.whole(but=2)
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [("multirotor", "ctbr"), ("any", "ctbr"), ("any", "rotor_share"), ("any", "rotor_speed")],
+)
+def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(name: str, mode: str) -> None:
+    """Plant, mixer and rate loop of each are those of the vehicle that was drawn, with as many rotors as it has."""
+    env, rng = environment(vehicle=name, command_mode=mode), np.random.default_rng(0)
     state, _ = env.reset(random_key(1), 5)
     action = rng.uniform(-1, 1, (3, 5, 4)).astype(np.float32)
     assert state.family is not None
-    flown, drawn = state, [vehicle_of(u) for u in np.asarray(state.family)]
+    flown, drawn = state, [vehicle_of(u, name) for u in np.asarray(state.family)]
     together, apart = jax.jit(lambda state, a: env.step(state, a, restart=False)[0]), jax.jit(step)
     for a in action:
         flown = together(flown, jnp.asarray(a))
     for i, vehicle in enumerate(drawn):
         physics, alone = Physics.of(vehicle, mode), jax.tree.map(lambda x: x[i], state.vehicle)  # noqa: B023
+        alone = dataclasses.replace(alone, rotor_speed=alone.rotor_speed[: vehicle.rotor_count])
         queue = [np.asarray(env.hover)] * 5
         for a in action[:, i]:
             queue = [a, *queue][:5]
@@ -85,7 +89,8 @@ def test_every_episode_flies_as_a_simulation_of_its_vehicle_alone(mode: str) -> 
             alone = apart(physics, physics.nominal, alone, after, previous=before, switch_time=switch)
         for name in ("position", "velocity", "quaternion", "body_rate", "rotor_speed"):
             wanted = np.asarray(getattr(alone, name))
-            np.testing.assert_allclose(getattr(flown.vehicle, name)[i], wanted, rtol=2e-3, atol=2e-3)
+            found = np.asarray(getattr(flown.vehicle, name))[i, : len(wanted)]
+            np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=2e-3)
 
 
 def test_the_centre_of_mass_is_off_in_proportion_to_the_arm() -> None:
@@ -98,6 +103,16 @@ def test_the_centre_of_mass_is_off_in_proportion_to_the_arm() -> None:
     assert share.max() <= largest * (1 + 1e-4)
     small, large = (share[rows].max() for rows in (own[:, 0, 1] > -0.04, own[:, 0, 1] < -0.15))
     assert min(small, large) > 0.9 * largest
+
+
+def test_the_centre_of_mass_of_a_frame_is_off_in_proportion_to_its_size() -> None:
+    env = environment(vehicle="multirotor", disturbance=DisturbanceConfig(centre_of_mass=0.01))
+    state, _ = env.reset(random_key(0), 200)
+    drawn = family("multirotor").draw(np.asarray(state.family, np.float64))
+    off = np.asarray(state.plant["rotor_position"]) - drawn.rotor_position
+    assert np.abs(off - off[:, :1]).max() < 1e-6
+    share = np.abs(off[:, 0, :2]).max(1) / drawn.radius * family("multirotor").middle.radius
+    assert 0.009 < share.max() <= 0.01 + 1e-5
 
 
 def test_a_new_episode_has_another_vehicle_and_delay() -> None:
@@ -146,6 +161,19 @@ def test_a_mode_whose_commands_differ_from_vehicle_to_vehicle_is_refused() -> No
         environment(command_mode="rotor_thrust")
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"command_mode": "rotor_share"}, "'multirotor': 'ctbr', as each has its own number of rotors"),
+        ({"lost_rotor": 0.5}, "env.lost_rotor is 0.5; accepted for vehicle 'multirotor': 0"),
+        ({"randomize": {"rotor_spin": 0.1}}, "env.randomize.rotor_spin is 0.1; accepted for vehicle 'multirotor'"),
+    ],
+)  # fmt: skip
+def test_frames_refuse_what_is_of_each_rotor(options: dict, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        environment(vehicle="multirotor", **options)
+
+
 def test_a_task_without_a_recipe_for_families_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["train", "avoid", "--vehicle", "any"]) == 2
     said = " ".join(capsys.readouterr().err.split())
@@ -185,6 +213,7 @@ def test_the_contract_has_ranges_instead_of_a_hash(trained: Path) -> None:
     told = json.loads(contract.to_json())
     assert "vehicle_hash" not in told
     assert told["vehicle_ranges"]["mass"] == [0.025, 12.0]
+    assert "rotors" not in told["vehicle_ranges"]
     assert contract.vehicle_ranges == family().ranges
     assert contract.latency_range_s == (0.0, 0.12)
     for change, said in (

@@ -60,7 +60,7 @@ from e2efly.simulation.sensors import imu, latency
 from e2efly.simulation.sensors.eyes import Eye, image_shape, steady
 from e2efly.simulation.sensors.noise import add_noise
 from e2efly.tasks.task import Guided, Shape, Task, into_ball, make_task, uniform
-from e2efly.vehicles.family import DRAWN, Family, load_family
+from e2efly.vehicles.family import Family, load_family
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 from e2efly.vehicles.vehicle import Flown
@@ -473,7 +473,7 @@ class Env:
         task_key, plant_key, wind_key, action_key, observation_key, eyes_key, onward = jax.random.split(key, 7)
         family = None
         if self.family is not None:
-            family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, DRAWN), self.center.dtype)
+            family = jax.random.uniform(jax.random.fold_in(plant_key, 2), (n, self.family.drawn), self.center.dtype)
         flown = self._physics(family).flown
         disturbed, known = None, dict[str, Any]()
         if self.posterior is None:
@@ -491,7 +491,12 @@ class Env:
             rotors: Any = plant.get("rotor_position", flown.rotor_position)
             offset = self.disturbance.centre_of_mass * uniform(mass_key, n, 2)[:, None]
             if self.family is not None:  # in proportion to the size
-                offset = offset * jnp.abs(flown.rotor_position / self.physics.flown.rotor_position)
+                middle = self.physics.flown
+                offset = offset * (
+                    jnp.abs(flown.rotor_position / middle.rotor_position)
+                    if flown.rotor_axis is None
+                    else (flown.radius / middle.radius)[:, None, None]
+                )
             plant["rotor_position"] = rotors - disturbance.level(offset, rotors)
         lost = None
         if self.lost_rotor is not None and self.lost_rotor_time is not None:

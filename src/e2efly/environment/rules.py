@@ -33,6 +33,8 @@ def check(
             f"env.integrator is {config.integrator!r}; accepted: {', '.join(SWINGING)}, as env.payload has a load"
         )
     check_widths(body, config.randomize, "env.randomize")
+    if family is not None and family.ranges.rotors is not None:
+        check_frames(config, family.name)
     latest = vehicle.latency if family is None else family.ranges.latency[1]
     if config.action_latency is None and latest + config.latency_spread[1] > LATEST:
         raise ValueError(
@@ -66,3 +68,16 @@ def check(
             f"these cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws "
             "that leave at least 1"
         )
+
+
+def check_frames(config: EnvConfig, name: str) -> None:
+    """Refuse what is drawn for each rotor, with a family whose vehicles differ in their number of rotors.
+
+    Raises:
+        ValueError: naming the option, its value and what is accepted.
+    """
+    if config.lost_rotor:
+        raise ValueError(f"env.lost_rotor is {config.lost_rotor}; accepted for vehicle {name!r}: 0")
+    for f in dataclasses.fields(Vehicle):
+        if "per_rotor" in f.metadata and config.randomize.get(f.name):
+            raise ValueError(f"env.randomize.{f.name} is {config.randomize[f.name]}; accepted for vehicle {name!r}: 0")

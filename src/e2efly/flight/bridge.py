@@ -46,7 +46,7 @@ from e2efly.policy.runtime import Decision, Imu
 from e2efly.policy.worker import Worker
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.vehicles.vehicle_rules import check_quadrotor
+from e2efly.vehicles.vehicle_rules import check_level
 
 ATTITUDE_S, BLIND_ATTITUDE_S = 0.1, 0.5
 """Largest age of the controller's attitude, s: for the estimates of heading and velocity, and for a descent without
@@ -111,9 +111,9 @@ class Bridge:
             neighbours: the other vehicles. None: nothing is known of any.
 
         Raises:
-            ValueError: for a vehicle that is not a quadrotor with level rotors.
+            ValueError: for a vehicle with tilted rotors.
         """
-        check_quadrotor(vehicle, "a flight")
+        check_level(vehicle, "a flight")
         delay: float = vehicle.latency if latency is None else latency
         self.autopilot, self.source, self.vehicle, self.settings = autopilot, source, vehicle, settings
         self.gentle = flight_gains(vehicle, delay)

@@ -21,7 +21,7 @@ from e2efly.policy.images import Image
 from e2efly.policy.observation import OTHERS, PAST_ACTIONS, Field, Own, own_fields
 from e2efly.policy.others import Company
 from e2efly.policy.zoo import contents
-from e2efly.vehicles.family import Ranges
+from e2efly.vehicles.family import OF_FRAMES, Ranges
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import ROTOR_COUNTS, Vehicle
 from e2efly.vehicles.vehicle_domain import differences, misfits, vehicle_domain
@@ -257,6 +257,8 @@ class Contract:
         left_out = {"vehicle_ranges" if self.vehicle_ranges is None else "vehicle_hash"}
         left_out |= {name for name in OPTIONAL if getattr(self, name) is None}
         content = {key: value for key, value in dataclasses.asdict(self).items() if key not in left_out}
+        if self.vehicle_ranges is not None:
+            content["vehicle_ranges"] = self.vehicle_ranges.given
         text = json.dumps(content, indent=2)
         Contract.from_json(text)
         return text
@@ -368,8 +370,9 @@ def _domain(value: Any, field: str) -> Domain:
 
 
 def _ranges(value: Any) -> Ranges:
-    x = read.table(value, "vehicle_ranges", Ranges)
-    bounds = {name: read.numbers(pair, f"vehicle_ranges.{name}", 2) for name, pair in x.items()}
+    known = dict.fromkeys(OF_FRAMES) | value if isinstance(value, dict) else value
+    x = read.table(known, "vehicle_ranges", Ranges)
+    bounds = {name: read.numbers(pair, f"vehicle_ranges.{name}", 2) for name, pair in x.items() if pair is not None}
     ranges = Ranges(**{name: (pair[0], pair[1]) for name, pair in bounds.items()})
     ranges.check("contract: vehicle_ranges")
     return ranges

@@ -6,7 +6,7 @@ With virtual time the rig is a clock: sleeping on it lets the world and the firm
 import dataclasses
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, Self, TypeVar
@@ -103,7 +103,7 @@ class FirmwareRig(Generic[Stepped]):
 
     Time is virtual. With `real_time` it follows the machine's clock, as for a bridge in another process. `step` is the
     interval at which sensors are updated and motors are read, s, a whole number of ms. `pose_noise` replaces
-    `POSE_NOISE`. A subclass has `prepare`, `receive` and `autopilot`.
+    `POSE_NOISE`. `motors` are the firmware's motors, one for each rotor of the vehicle file. A subclass has `prepare`, `receive` and `autopilot`.
     """
 
     boot_s: float
@@ -119,11 +119,14 @@ class FirmwareRig(Generic[Stepped]):
         seed: int = 0,
         step: float = STEP_S,
         pose_noise: tuple[float, ...] = POSE_NOISE,
+        motors: Sequence[int] | None = None,
     ) -> None:
         compute_at_once()
+        self.motors = list(range(vehicle.rotor_count) if motors is None else motors)
+        """For each rotor of the vehicle file, its motor in the order of the firmware. None: the same order."""
         self._step = step
         self.sitl = sitl
-        self.thrust_shares = np.ones(4)
+        self.thrust_shares = np.ones(vehicle.rotor_count)
         """Thrust of each rotor divided by the thrust from the vehicle's thrust map."""
         self.carry(vehicle)
         self.state: FlownBody = self.world.at_rest()
@@ -133,7 +136,7 @@ class FirmwareRig(Generic[Stepped]):
         self.wind = np.zeros(3)
         self.held = False
         """Whether the body is held in place, so that the rotors do not move it."""
-        self.shares = np.ones(4)
+        self.shares = np.ones(vehicle.rotor_count)
         """Share of each motor's output that its rotor follows. It is below 1 for a flat battery or a weak motor."""
         self.felt: Callable[[FirmwareState], FirmwareState] | None = None
         """Function from the true state to the readings of the firmware's sensors. None: the sensors are exact."""
@@ -150,9 +153,9 @@ class FirmwareRig(Generic[Stepped]):
         self._open = ExitStack()
 
     def carry(self, vehicle: Vehicle) -> None:
-        """Put a vehicle under the firmware. The state stays the same."""
+        """Put a vehicle under the firmware, with as many rotors as before. The state stays the same."""
         self.world = World(vehicle)
-        self.world.advance(self.world.at_rest(), np.ones(4), STEP_S)  # compile while it has all cores
+        self.world.advance(self.world.at_rest(), np.ones(vehicle.rotor_count), STEP_S)  # compile while it has all cores
 
     def __enter__(self) -> Self:
         self.start()
@@ -221,7 +224,7 @@ class FirmwareRig(Generic[Stepped]):
 
     def step(self, dt: float) -> None:
         """Run one step of the world and of the firmware."""
-        motors = self.sitl.motors() if self._on else np.zeros(4)
+        motors = self.sitl.motors()[self.motors] if self._on else np.zeros(len(self.motors))
         after = self.state if self.held else self._moved(motors, dt)
         if self._on:
             sensed = self._shaken(self.world.sensed(self.state, after, dt), after)

@@ -11,6 +11,7 @@ from typing import Any
 from e2efly.flight.betaflight.autopilot import AIDING_SCHEDULE, Betaflight
 from e2efly.flight.betaflight.client import SCHEDULE
 from e2efly.flight.betaflight.firmware_gains import gain_lines, gains_of
+from e2efly.flight.betaflight.mixers import mixer_of
 from e2efly.flight.betaflight.throttle_curve import ThrottleCurve
 from e2efly.flight.betaflight.versions import Release
 from e2efly.flight.link import Link, open_link
@@ -22,7 +23,6 @@ from e2efly.validation.firmware_rig import FirmwareRig
 from e2efly.validation.sitl import Sitl
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
-from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 BLACKBOX = (
     "set blackbox_device=VIRTUAL",
@@ -72,9 +72,13 @@ class Rig(FirmwareRig[Sitl]):
     def __init__(
         self, firmware: Firmware, folder: Path, vehicle: Vehicle, *, settings: tuple[str, ...] = (), **world: Any
     ) -> None:
-        """Put a vehicle under the firmware; see `FirmwareRig` for the other arguments."""
-        check_quadrotor(vehicle, "the rig of the Betaflight firmware")
-        super().__init__(Sitl(firmware, folder), vehicle, **world)
+        """Put a vehicle under the firmware; see `FirmwareRig` for the other arguments.
+
+        Raises:
+            ValueError: if the firmware has no mixer for its rotors.
+        """
+        motors = mixer_of(vehicle).motors
+        super().__init__(Sitl(firmware, folder, vehicle.rotor_count), vehicle, motors=motors, **world)
         self._settings = (*vehicle_lines(vehicle, firmware.release), *SETTINGS, *settings)
 
     def prepare(self) -> None:
@@ -109,10 +113,20 @@ class Rig(FirmwareRig[Sitl]):
 
 
 def vehicle_lines(vehicle: Vehicle, release: Release) -> tuple[str, ...]:
-    """The firmware's settings for a vehicle: the gains of the rate loop, and the throttle without a receiver."""
+    """The firmware's settings for a vehicle: its mixer, the gains of the rate loop, and the throttle without a
+    receiver.
+
+    Raises:
+        ValueError: if the firmware has no mixer for its rotors.
+    """
     hover = ThrottleCurve().channel_for(ThrottleMap.of(vehicle).throttle(GRAVITY))
     sinks = (hover // FAILSAFE_STEP - 1) * FAILSAFE_STEP
-    return (*gain_lines(gains_of(vehicle), release), f"rxfail 3 s {sinks}", f"set failsafe_throttle={sinks}")
+    return (
+        *mixer_of(vehicle).lines,
+        *gain_lines(gains_of(vehicle), release),
+        f"rxfail 3 s {sinks}",
+        f"set failsafe_throttle={sinks}",
+    )
 
 
 def prepare(sitl: Sitl, settings: tuple[str, ...] = SETTINGS) -> None:

@@ -19,7 +19,9 @@ from e2efly.validation.firmware_program import Firmware
 
 _STATE = struct.Struct("<18d")
 _RC = struct.Struct("<d16H")
-_MOTORS = struct.Struct("<4f")
+_MOTORS, _OUTPUTS = struct.Struct("<4f"), struct.Struct("<H2x16f")
+"""The packet of four motors, and that of all outputs: the number of motors, and pulses, us, of which theirs are first
+(betaflight: `servo_packet_raw` of SIMULATOR/target/SITL/target.h)."""
 _TRIES = 5
 """Number of starts with other ports before giving up."""
 _PORTS = 12
@@ -32,6 +34,8 @@ IDLE_S = 0.002
 _TAKEN = re.compile(rb"bind port .* failed|UDP server .*\.\.\.-")
 """Messages of the firmware when another program has one of its ports."""
 _RANDOM = random.SystemRandom()
+STOPPED, FULL = 1000.0, 2000.0
+"""Pulses of a motor output of 0 and of 1, us."""
 BOOT_S = 20.0
 """Longest real time for the firmware to open its ports, or to answer, s."""
 
@@ -84,7 +88,7 @@ class Sitl:
     Its time is virtual: it runs only inside `advance`. Use it as a context manager.
     """
 
-    def __init__(self, firmware: Firmware, folder: Path) -> None:
+    def __init__(self, firmware: Firmware, folder: Path, rotors: int = 4) -> None:
         self.firmware, self.folder = firmware, folder
         self._layout = firmware.layout
         self.base = free_ports()
@@ -92,7 +96,7 @@ class Sitl:
         """The firmware's time: seconds since its first start. It goes on while the firmware is off."""
         self._booted = 0.0
         self._process: subprocess.Popen | None = None
-        self._motors = np.zeros(4)
+        self._rotors, self._motors = rotors, np.zeros(rotors)
         self._clock: mmap.mmap | None = None
         self._go = self._poke = self._done = -1
         folder.mkdir(parents=True, exist_ok=True)
@@ -100,9 +104,9 @@ class Sitl:
         self._in = self._listening()
 
     def _listening(self) -> socket.socket:
-        """Socket to which the firmware sends its motor outputs."""
+        """Socket to which the firmware sends its motor outputs: of four motors, or all."""
         found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        found.bind(("127.0.0.1", self.base + 1))
+        found.bind(("127.0.0.1", self.base + (self._rotors == 4)))
         found.setblocking(False)
         return found
 
@@ -156,6 +160,9 @@ class Sitl:
             "E2EFLY_SITL_GO": str(go), "E2EFLY_SITL_POKE": str(poke), "E2EFLY_SITL_DONE": str(done),
         }  # fmt: skip
         self._booted = self.now
+        with suppress(BlockingIOError):  # what was sent before, with other settings
+            while self._in.recv(_OUTPUTS.size):
+                pass
         output = self.folder / "output.txt"
         try:
             with output.open("wb") as log:
@@ -190,7 +197,7 @@ class Sitl:
             if end >= 0:
                 os.close(end)
         self._go = self._poke = self._done = -1
-        self._motors = np.zeros(4)
+        self._motors = np.zeros(self._rotors)
 
     def close(self) -> None:
         """Stop it and free its sockets."""
@@ -267,14 +274,24 @@ class Sitl:
                 pass
 
     def motors(self) -> np.ndarray:
-        """(4,) the newest motor outputs, 0 to 1: rear right, front right, rear left, front left."""
+        """The newest motor outputs, 0 to 1, one for each rotor, in the order of the firmware's mixer. Of four: rear
+        right, front right, rear left, front left.
+
+        Raises:
+            OSError: when the firmware drives another number of motors.
+        """
         while True:
             try:
-                packet = self._in.recv(64)
+                packet = self._in.recv(_OUTPUTS.size)
             except BlockingIOError:
                 return self._motors
-            if len(packet) == _MOTORS.size:
+            if self._rotors == 4 and len(packet) == _MOTORS.size:
                 self._motors = np.array(_MOTORS.unpack(packet))[list(self._layout.motors)]
+            elif self._rotors != 4 and len(packet) == _OUTPUTS.size:
+                count, *pulses = _OUTPUTS.unpack(packet)
+                if count != self._rotors:
+                    raise OSError(f"the firmware drives {count} motors; accepted: {self._rotors}, as its settings say")
+                self._motors = np.clip((np.array(pulses[:count]) - STOPPED) / (FULL - STOPPED), 0.0, 1.0)
 
     def _shared(self) -> tuple[int, ...]:
         assert self._clock is not None

@@ -56,7 +56,9 @@ class World:
         """The state on the ground with stopped rotors."""
         zero = np.zeros(3)
         position = np.array([x, y, self.vehicle.feet_height])
-        return FlownBody(position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(4))
+        return FlownBody(
+            position, zero, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), zero, np.zeros(self.vehicle.rotor_count)
+        )
 
     def advance(
         self,
@@ -68,14 +70,16 @@ class World:
     ) -> FlownBody:
         """The state after `dt` s, a whole number of `STEP_S`, under constant motor outputs.
 
-        The outputs, (4,) in [0, 1] in Betaflight's order, are proportional to the rotor speeds. The wind is in the
-        world, m/s. `rotor_share` is the thrust of each rotor divided by the thrust from the vehicle's thrust map.
+        The outputs, (N,) in [0, 1] in the order of the vehicle file, are proportional to the rotor speeds. The wind is
+        in the world, m/s. `rotor_share` is the thrust of each rotor divided by the thrust from the vehicle's thrust
+        map.
         """
         standing = state.position[2] <= self.vehicle.feet_height and not (state.velocity.any() or state.body_rate.any())
         if standing and not (motors.any() or state.rotor_speed.any()):
             return state  # nothing changes for seconds after each boot
         steps = max(round(dt / STEP_S), 1)
-        air, share = np.zeros(3) if wind is None else wind, np.ones(4) if rotor_share is None else rotor_share
+        air, share = np.zeros(3) if wind is None else wind, rotor_share
+        share = np.ones(self.vehicle.rotor_count) if share is None else share
         parts = (getattr(state, f.name) for f in fields_of(FlownBody))
         row = np.concatenate([*parts, np.asarray(motors) * self.full_speed, air, share]).astype(np.float32)
         after = np.asarray(self._steps(row, steps), np.float64)  # one array in and out: the transfer costs most
@@ -84,11 +88,11 @@ class World:
     @cached_property
     def _steps(self) -> Any:
         """(row of state, rotor commands, wind, shares; steps) -> row of state, with the vehicle's numbers built in."""
-        vehicle = self.vehicle
+        vehicle, n = self.vehicle, self.vehicle.rotor_count
 
         def run(row: Any, steps: int) -> Any:
-            state = State(row[:3], row[3:6], row[6:10], row[10:13], row[13:17])
-            command, air, plant = tuple(row[17:21]), Vec3.of(row[21:24]), Airframe.of(vehicle, STEP_S, row[24:28])
+            state, rest = State(row[:3], row[3:6], row[6:10], row[10:13], row[13 : 13 + n]), row[13 + n :]
+            command, air, plant = tuple(rest[:n]), Vec3.of(rest[n : n + 3]), Airframe.of(vehicle, STEP_S, rest[n + 3 :])
 
             def step(parts: Parts, _: None) -> tuple[Parts, None]:
                 told = reached(plant, parts.rotor_speed, command)  # type: ignore[arg-type]

@@ -18,14 +18,15 @@ import numpy as np
 
 from e2efly.config.domain import Domain, Extent
 from e2efly.config.tables import read_table
+from e2efly.vehicles import rotor_frames
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import FAMILIES, OF_FAMILIES, load_vehicle, read_values, vehicle_file
-from e2efly.vehicles.vehicle import Vehicle, quantities
+from e2efly.vehicles.rotor_frames import Range
+from e2efly.vehicles.vehicle import Vehicle, quantities, rotor_arms, rotor_axes
 from e2efly.vehicles.vehicle_domain import misfits
 
 DRAWN = 20
-"""Number of uniform random numbers that define a vehicle."""
-Range = tuple[float, float]
+"""Number of uniform random numbers that define a quadrotor."""
 
 _ARM_OF_KILOGRAM = 0.12
 """Arm of a typical quadrotor of 1 kg, m. The arm grows with the cube root of the mass, from the Crazyflie to 5-inch
@@ -46,6 +47,11 @@ def _range(unit: str, at_least: float | None = None, above: float | None = None,
     """Smallest and largest value of a quantity, with the bounds that both must satisfy."""
     entry = {"unit": unit, "shape": (2,), "at_least": None, "above": None}
     return dataclasses.field(metadata=entry | {"from": at_least, "beyond": above, "high": high})
+
+
+def _of_frames(unit: str, at_least: float, high: float) -> Any:
+    """A range that a family of quadrotors does not have."""
+    return dataclasses.field(default=None, metadata=_range(unit, at_least, high=high).metadata)
 
 
 @dataclass(frozen=True)
@@ -81,11 +87,24 @@ class Ranges:
     """Quadratic drag divided by mass, for each axis."""
     control_rate: Range = _range("Hz", at_least=0.1, high=10_000.0)
     """Rate at which the policy is called. Both ends of the range are the same number."""
+    rotors: Range | None = _of_frames("1", 4.0, rotor_frames.MOST)
+    """Number of rotors. This range and the two below are given together, or all are None: four level rotors that lie
+    symmetrically."""
+    tilt: Range | None = _of_frames("rad", 0.0, math.pi / 4)
+    """Largest angle between a rotor's axis and body z."""
+    lopsided: Range | None = _of_frames("1", 0.0, 0.3)
+    """Distance of the rotors' mean place from the centre of mass along body x and y, the larger of the two, divided by
+    the arm."""
+
+    @property
+    def given(self) -> dict[str, Range]:
+        """The ranges that are not None, by name."""
+        return {name: value for name, value in dataclasses.asdict(self).items() if value is not None}
 
     @property
     def hash(self) -> str:
         """First 16 hex digits of the SHA-256 of all ranges."""
-        return hashlib.sha256(json.dumps(dataclasses.asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(self.given, sort_keys=True).encode()).hexdigest()[:16]
 
     def check(self, where: str) -> None:
         """Check each range, and that vehicles can be drawn within all of them.
@@ -93,7 +112,9 @@ class Ranges:
         Raises:
             ValueError: naming the range, its values and what is accepted.
         """
-        for known in dataclasses.fields(self):
+        if 0 < sum(name in self.given for name in OF_FRAMES) < len(OF_FRAMES):
+            raise ValueError(f"{where}: {', '.join(OF_FRAMES)} are not all given; accepted: all three, or none")
+        for known in (f for f in dataclasses.fields(self) if f.name in self.given):
             low, high = getattr(self, known.name)
             least, above, most = (known.metadata[key] for key in ("from", "beyond", "high"))
             if not ((low >= least if above is None else low > above) and low <= high <= most):  # also false for NaN
@@ -116,7 +137,7 @@ class Ranges:
     @property
     def domain(self) -> Domain:
         """The ranges of what a vehicle file has: all but the control rate, which belongs to the policy."""
-        known = [f for f in dataclasses.fields(self) if f.name != "control_rate"]
+        known = [f for f in dataclasses.fields(self) if f.name != "control_rate" and f.name in self.given]
         return tuple(Extent(f.name, f.metadata["unit"], *getattr(self, f.name)) for f in known)
 
     def outside(self, vehicle: Vehicle) -> tuple[str, ...]:
@@ -127,6 +148,10 @@ class Ranges:
         """The quantities of these ranges that a loaded vehicle has."""
         values = measured(vehicle)
         return tuple(Extent(x.name, x.unit, min(values[x.name]), max(values[x.name])) for x in self.domain)
+
+
+OF_FRAMES = tuple(f.name for f in dataclasses.fields(Ranges) if f.default is None)
+"""The ranges that only families of frames with several rotors have."""
 
 
 def measured(vehicle: Vehicle) -> dict[str, tuple[float, ...]]:
@@ -147,6 +172,9 @@ def measured(vehicle: Vehicle) -> dict[str, tuple[float, ...]]:
         "torque_ratio": (v.torque_ratio / arm,),
         "drag_linear": tuple(float(k) / v.mass for k in v.drag_linear),
         "drag_quadratic": tuple(float(k) / v.mass for k in v.drag_quadratic),
+        "rotors": (float(v.rotor_count),),
+        "tilt": (float(np.arccos(np.clip(rotor_axes(v)[:, 2], -1.0, 1.0)).max()),),
+        "lopsided": (float(np.abs(rotor_arms(v).mean(0)).max()) / arm,),
     }
 
 
@@ -157,29 +185,37 @@ class Family:
     name: str
     """The stem of its file name."""
     ranges: Ranges
+    straightened: bool = True
+    """Whether frames of several rotors that do not hover are straightened until they do (`rotor_frames.hovers`)."""
 
     @property
     def hash(self) -> str:
         """The hash of its ranges. The laws are the same for all families."""
         return self.ranges.hash
 
+    @property
+    def drawn(self) -> int:
+        """Number of uniform random numbers that define a vehicle."""
+        return DRAWN if self.ranges.rotors is None else DRAWN + rotor_frames.DRAWN
+
     @cached_property
     def middle(self) -> Vehicle:
         """The vehicle in the middle of all draws, float64, as if loaded. Its latency is the middle of its range."""
-        return _loaded(self.draw(np.full(DRAWN, 0.5)), self.name)
+        return _loaded(self.draw(np.full(self.drawn, 0.5)), self.name)
 
     def sample(self, count: int, seed: int) -> list[Vehicle]:
         """Draw `count` vehicles, each as if loaded from a file of its own, float64."""
-        drawn = np.random.default_rng(seed).random((count, DRAWN))
+        drawn = np.random.default_rng(seed).random((count, self.drawn))
         return [_loaded(self.draw(u), f"{self.name}_{i}") for i, u in enumerate(drawn)]
 
     def draw(self, u: Any) -> Vehicle:
-        """The vehicle that belongs to given uniform numbers. The numbers are (*n, `DRAWN`), uniform in [0, 1), from
+        """The vehicle that belongs to given uniform numbers. The numbers are (*n, `drawn`), uniform in [0, 1), from
         NumPy or JAX.
 
         Returns:
             The vehicle. Each field has the leading axes *n. Its largest commanded rates are within the ranges. Its
             gains above the rate loop follow from the gain of that loop; a policy that commands rates does not use them.
+            A family of frames draws `rotor_frames.MOST` rotors, of which those that are absent have an axis of zero.
         """
         r, xp = self.ranges, u.__array_namespace__() if hasattr(u, "__array_namespace__") else np
         (
@@ -222,7 +258,7 @@ class Family:
         flapping = xp.clip(_between(linear, r.drag_linear)[..., None] * flapping, *r.drag_linear)
         three = xp.ones_like(inertia)
         slow = gain / 3
-        return Vehicle(
+        quadrotor = Vehicle(
             name=self.name,
             mass=m,
             inertia=inertia,
@@ -249,6 +285,29 @@ class Family:
             feet_height=0.5 * arm,
             radius=arm + radius,
         )
+        return quadrotor if r.rotors is None else self._framed(xp, u[..., DRAWN:], arm, quadrotor)
+
+    def _framed(self, xp: Any, u: Any, arm: Any, vehicle: Vehicle) -> Vehicle:
+        """A drawn quadrotor with the rotors of a drawn frame in place of its four. Its thrust over the weight, and all
+        else, stays.
+        """
+        rotors, tilt, lopsided = (self.ranges.given[name] for name in OF_FRAMES)
+        strength, torque_ratio = 4 * vehicle.rotor_thrust_max / (vehicle.mass * GRAVITY), vehicle.torque_ratio / arm
+
+        def hovers(frame: rotor_frames.RotorFrame) -> Any:
+            return rotor_frames.hovers(xp, frame, strength, torque_ratio)
+
+        frame = rotor_frames.draw(xp, u, rotors, tilt, lopsided, hovers if self.straightened else None)
+        share = 4 / frame.axis[..., 2].sum(-1)
+        return dataclasses.replace(
+            vehicle,
+            rotor_position=frame.place * arm[..., None, None],
+            rotor_axis=frame.axis,
+            rotor_spin=frame.spin,
+            thrust_map=vehicle.thrust_map * share[..., None],
+            rotor_thrust_max=vehicle.rotor_thrust_max * share,
+            mixer="qp",
+        )
 
     def limits(self, command_mode: str) -> tuple[list[float], list[float]]:
         """Smallest and largest command, the same for every vehicle of the family.
@@ -262,12 +321,10 @@ class Family:
         if command_mode == "ctbr":
             rates = [r.roll_rate_max[1], r.roll_rate_max[1], r.yaw_rate_max[1]]
             return [0.0, *(-x for x in rates)], [min(r.thrust_to_weight[1], _COMMANDED) * GRAVITY, *rates]
-        if command_mode in ("rotor_share", "rotor_speed"):
+        if command_mode in ("rotor_share", "rotor_speed") and r.rotors is None:
             return [0.0] * 4, [1.0] * 4
-        raise ValueError(
-            f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr', 'rotor_share' or "
-            "'rotor_speed'"
-        )
+        rotors = ", 'rotor_share' or 'rotor_speed'" if r.rotors is None else ", as each has its own number of rotors"
+        raise ValueError(f"env.command_mode is {command_mode!r}; accepted for vehicle {self.name!r}: 'ctbr'{rotors}")
 
 
 def _between(u: Any, bounds: Range) -> Any:
@@ -282,10 +339,15 @@ def _log(xp: Any, u: Any, bounds: Range) -> Any:
 
 
 def _loaded(vehicle: Vehicle, name: str) -> Vehicle:
-    """A vehicle without leading axes, as if read from a file: plain numbers in place of arrays without axes."""
+    """A vehicle without leading axes, as if read from a file: plain numbers in place of arrays without axes, and only
+    the rotors that it has.
+    """
     values = {f.name: getattr(vehicle, f.name) for f in quantities(vehicle)}
+    if vehicle.rotor_axis is not None:
+        has = rotor_frames.present(vehicle.rotor_axis)
+        values |= {f.name: values[f.name][has] for f in quantities(vehicle) if "per_rotor" in f.metadata}
     plain: dict[str, Any] = {key: value if np.ndim(value) else float(value) for key, value in values.items()}
-    return Vehicle(name=name, **plain)
+    return Vehicle(name=name, mixer=vehicle.mixer, **plain)
 
 
 def family_names() -> list[str]:

@@ -13,6 +13,7 @@ from math import degrees
 
 import numpy as np
 
+from e2efly.flight.betaflight.mixers import mixer_of
 from e2efly.flight.betaflight.rates import AXES
 from e2efly.flight.betaflight.versions import Release
 from e2efly.vehicles.vehicle import Vehicle, allocation_matrix
@@ -49,7 +50,7 @@ def authority_of(vehicle: Vehicle) -> np.ndarray:
     """(3,) angular acceleration about x, y and z for a torque output of 1, at hover, rad/s^2."""
     k2, k1, _ = vehicle.thrust_map
     slope = (2 * k2 * vehicle.hover_rotor_speed + k1) * (vehicle.full_rotor_speed - vehicle.rotor_speed_min)
-    return slope * np.abs(allocation_matrix(vehicle)[1:]).sum(1) / vehicle.inertia
+    return slope * np.abs(allocation_matrix(vehicle)[1:] * mixer_of(vehicle).shares).sum(1) / vehicle.inertia
 
 
 def rate_gain_of(vehicle: Vehicle, pid: tuple[tuple[int, int, int], ...]) -> list[float]:

@@ -10,10 +10,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from e2efly.control.allocation import Allocation, ThrustLimits, nearest, shifted
+from e2efly.control.allocation import THRUST, TILT, YAW, Allocation, ThrustLimits, nearest, shifted
 from e2efly.control.vectors import Vec3
-from e2efly.simulation.physics.airframe import Rotors
+from e2efly.simulation.physics.airframe import Rotors, Tilt
 from e2efly.simulation.physics.state import split
+from e2efly.vehicles.gravity import GRAVITY
+from e2efly.vehicles.rotor_frames import smallest_norm
 from e2efly.vehicles.vehicle import MixerRule, Vehicle
 
 
@@ -48,18 +50,24 @@ class Mixer:
 
     @staticmethod
     def of_each(vehicle: Vehicle) -> "Mixer":
-        """The mixers of a batch of vehicles whose rotors lie symmetrically about both axes, as a family draws them.
+        """The mixers of a batch of vehicles that a family draws.
 
-        For them the rows of the allocation matrix are orthogonal. Its inverse is its transpose, with each column
-        divided by the squared norm of its row.
+        Level rotors of a family lie symmetrically about both axes, so the rows of the allocation matrix are orthogonal.
+        Its inverse is its transpose, with each column divided by the squared norm of its row. For tilted rotors, by the
+        rule `qp`, a gradient step is up to 4 % shorter than that of `of`: it is by a bound of the largest eigenvalue.
         """
+        k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
+        idle = vehicle.rotor_speed_min
+        low, high = (k2 * idle + k1) * idle + k0, vehicle.rotor_thrust_max
+        if (tilt := Tilt.of(vehicle)) is not None:
+            wrench = jnp.stack([jnp.stack(row, axis=-1) for row in (tilt.axis[2], *tilt.moment)], axis=-2)
+            matrix = jnp.stack(smallest_norm([wrench[..., i, :] for i in range(4)]), axis=-1)
+            return Mixer(matrix, low, high, None, "qp", *_gradient_step(vehicle, wrench))
         x, y = vehicle.rotor_position[..., 0], vehicle.rotor_position[..., 1]
         yaw = vehicle.rotor_spin * vehicle.torque_ratio[..., None]
         rows = [jnp.ones_like(x), y, -x, yaw]
         matrix = jnp.stack([row / jnp.sum(row**2, axis=-1, keepdims=True) for row in rows], axis=-1)
-        k2, k1, k0 = (vehicle.thrust_map[..., i] for i in range(3))
-        idle = vehicle.rotor_speed_min
-        return Mixer(matrix, (k2 * idle + k1) * idle + k0, vehicle.rotor_thrust_max)
+        return Mixer(matrix, low, high)
 
     def limit(self, thrust: Rotors) -> Rotors:
         """The thrust of each rotor, clipped to the rotor's limits."""
@@ -76,6 +84,27 @@ class Mixer:
     @property
     def _limits(self) -> ThrustLimits:
         return ThrustLimits(self.thrust_min, self.thrust_max, jnp.maximum, jnp.minimum)
+
+
+def _gradient_step(vehicle: Vehicle, wrench: Array) -> tuple[Array, Array]:
+    """`descent` and `pull` of an `Allocation`, for a batch of vehicles with these wrench matrices, (*n, 4, N)."""
+    has = jnp.any(vehicle.rotor_axis != 0, axis=-1)
+    count, weight = has.sum(-1), vehicle.mass * GRAVITY
+    arm = jnp.sum(jnp.linalg.norm(vehicle.rotor_position[..., :2], axis=-1), axis=-1) / count
+    units = weight * jnp.stack([jnp.ones_like(arm), arm, arm, jnp.abs(wrench[..., 3, :]).sum(-1) / count])
+    pace = jnp.moveaxis(jnp.array([THRUST, TILT, TILT, YAW])[:, None] / units**2, 0, -1)
+    root = wrench * jnp.sqrt(pace)[..., None]
+    power, steepest = _times(root, root), jnp.ones(())
+    for i in range(5):  # the norm of a matrix's power 2^i is at most twice the largest eigenvalue to that power
+        size = jnp.sqrt(jnp.sum(power**2, axis=(-2, -1), keepdims=True))
+        power, steepest = _times(power / size, power / size), steepest * size ** (0.5**i)
+    pull = jnp.swapaxes(wrench * pace[..., None], -2, -1) / steepest
+    return jnp.eye(wrench.shape[-1]) - _times(pull, jnp.swapaxes(wrench, -2, -1)), pull
+
+
+def _times(a: Array, b: Array) -> Array:
+    """The product of a and the transpose of b, both (*n, i, k), of small matrices."""
+    return jnp.sum(a[..., :, None, :] * b[..., None, :, :], axis=-1)
 
 
 def _rows(matrix: np.ndarray | Array) -> list[Rotors]:

@@ -8,12 +8,12 @@ import numpy as np
 
 from e2efly.control import Vec3
 from e2efly.flight.betaflight.messages import set_raw_rc
+from e2efly.flight.betaflight.mixers import mixer_of
 from e2efly.flight.betaflight.sticks import Sticks
 from e2efly.flight.pilot.hover import controlled
 from e2efly.validation.plant import EVERYTHING, Plant, RigidState, check_mode
 from e2efly.validation.plants.registry import register
 from e2efly.vehicles.vehicle import RATE_LOOP, Vehicle
-from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 if TYPE_CHECKING:
     from e2efly.flight.bridge import Bridge
@@ -41,11 +41,12 @@ class BetaflightPlant(Plant):
         """Build the firmware if needed, start it and take off.
 
         Raises:
-            ValueError: for a command mode that does not lead to body rates and thrust.
+            ValueError: for a command mode that does not lead to body rates and thrust, and for rotors that no mixer of
+                the firmware drives.
             OSError: when the firmware cannot be built or started, or does not take off.
         """
         check_mode(mode, self.name, rates=True)
-        check_quadrotor(vehicle, "plant 'betaflight'")
+        mixer_of(vehicle)
         from e2efly.validation import firmware_program
         from e2efly.validation.bridge_session import Session, rehearsal_settings
         from e2efly.validation.rig import Rig
@@ -75,11 +76,16 @@ class BetaflightPlant(Plant):
         """Put another body under the firmware. Throttle map and settings stay those of the vehicle that took off.
 
         Raises:
-            ValueError: for a plain mixer, because the firmware has its own mixer.
+            ValueError: for a plain mixer, because the firmware has its own mixer; for a body with another number of
+                rotors.
         """
         if plain_mixer:
             raise ValueError("plant 'betaflight' has the firmware's own mixer; accepted: plain_mixer False")
-        check_quadrotor(body, "plant 'betaflight'")
+        if body.rotor_count != self.vehicle.rotor_count:
+            raise ValueError(
+                f"vehicle {body.name!r} has {body.rotor_count} rotors; accepted: {self.vehicle.rotor_count}, which the "
+                "firmware drives"
+            )
         self._body = body
         self._rig.carry(body)
 
@@ -100,9 +106,9 @@ class BetaflightPlant(Plant):
         closed = self._sticks.arrange((mid, mid, mid, 1000), ())
         hover = self._bridge.map.throttle(9.81)
         spinning = self._sticks.channels_of(hover, (0.0, 0.0, 0.0), ()).channels
-        speed = np.full(4, self._body.hover_rotor_speed)
+        speed = np.full(self._body.rotor_count, self._body.hover_rotor_speed)
         rig.held, zero = True, np.zeros(3)
-        rig.wind, rig.thrust_shares = np.zeros(3), np.ones(4)
+        rig.wind, rig.thrust_shares = np.zeros(3), np.ones(self._body.rotor_count)
         rig.state = FlownBody(state.position, zero, np.array([1.0, 0, 0, 0]), zero, speed)
         for armed, channels, seconds in (
             (False, closed, DISARMED_S), (True, closed, ARMED_S), (True, spinning, SPINNING_S),
