@@ -4,7 +4,7 @@
 
 PATH is ArduPilot's SITL program, which is not part of this repository; E2EFLY_ARDUCOPTER may name it, too. Our rigid
 body stands behind its JSON interface. Policies, faults and verdicts are those of `mavlink.py`, where a peer of ours
-stands in for the firmware. The version is what the firmware tells. Seeds 7100000 and following. `--only` flies some of
+stands in for the firmware. The version is what the firmware tells. Each row has its first seed. `--only` flies some of
 the flights (`race`) and faults (`"the poses end"`); the rows of others stay in the file.
 """
 
@@ -55,7 +55,7 @@ def flights(program: Path, count: int, seed: int, wanted: Container[str]) -> Ite
             good += flight.complete and flight.success
             told.append(flight.told if flight.complete and flight.success else f"{flight.told}: {flight.reasons}")
         yield {
-            "flight": name, "ArduCopter": f"{good} of {count}", "the last": told[-1],
+            "flight": name, "seed": seed, "ArduCopter": f"{good} of {count}", "the last": told[-1],
             "what failed": "; ".join(text for text in told if ": (" in text),
         }  # fmt: skip
 
@@ -77,7 +77,7 @@ def faults(program: Path, count: int, seed: int, wanted: Container[str]) -> Iter
                 ends.append(flown(rig, session, fault))
                 session.close()
         yield {
-            "fault": fault.name, "acts": "autopilot" if fault.autopilot_acts else "bridge",
+            "fault": fault.name, "seed": seed, "acts": "autopilot" if fault.autopilot_acts else "bridge",
             "ArduCopter": f"{sum(end.good for end in ends)} of {count}", "the last": ends[-1].told,
             "what failed": "; ".join(end.told for end in ends if not end.good),
         }  # fmt: skip
@@ -109,7 +109,7 @@ def main() -> None:
             print(row, flush=True)
             found = {part: with_earlier("arducopter", args.json, part, (key,), [row])}
             found[other] = with_earlier("arducopter", args.json, other, (), [])
-            write("arducopter", args.json, {"firmware": version, "check": checked, **found, "seed": args.seed})
+            write("arducopter", args.json, {"firmware": version, "check": checked, **found})
 
 
 if __name__ == "__main__":

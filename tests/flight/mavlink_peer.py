@@ -21,7 +21,6 @@ RATES_HZ = {"ATTITUDE_QUATERNION": 4.0, "HIGHRES_IMU": 4.0, "RAW_IMU": 4.0, "RC_
 OFFBOARD, PX4_LAND, PX4_POSITION, PX4_STABILIZED = 6 << 16, (4 << 16) | (6 << 24), 3 << 16, 7 << 16
 GUIDED_NOGPS, COPTER_LAND, COPTER_STABILIZE = 20, 9, 0
 FLU = np.array([1.0, -1.0, -1.0])
-RADIO_S = 0.02
 PX4_VALUES = {
     "COM_OF_LOSS_T": 0.3, "COM_OBL_RC_ACT": 4, "NAV_RCL_ACT": 3, "COM_RCL_EXCEPT": 0, "COM_RC_IN_MODE": 0,
     "MAV_FWDEXTSP": 1, "MC_AIRMODE": 1, "MC_BAT_SCALE_EN": 0, "THR_MDL_FAC": 0.3, "COM_DISARM_LAND": 2.0,
@@ -112,7 +111,7 @@ class MavlinkRig(FlownPeer):
         """Modes, arming, and what ends each."""
         if self.heard:
             self._radio = self.time
-        received = self.time - self._radio < 0.5
+        received = self._received
         mine = OFFBOARD if self.px4 else GUIDED_NOGPS
         land = PX4_LAND if self.px4 else COPTER_LAND
         manual = PX4_STABILIZED if self.px4 else COPTER_STABILIZE
@@ -156,6 +155,11 @@ class MavlinkRig(FlownPeer):
     def _fail(self, why: str, mode: int) -> None:
         self.log.append(f"failsafe: {why}")
         self._to(mode, critical=True)
+
+    @property
+    def _received(self) -> bool:
+        """Whether it takes the receiver for alive: PX4's COM_RC_LOSS_T, ArduCopter's RC_FS_TIMEOUT."""
+        return self.time - self._radio < (0.5 if self.px4 else 1.0)
 
     @property
     def _deserted(self) -> bool:
@@ -212,7 +216,7 @@ class MavlinkRig(FlownPeer):
             counts = [*np.round(force / 9.80665 * 1000), *np.round(gyro * 1000)]
             return self.mav.raw_imu_encode(ms * 1000, *map(int, np.clip(counts, -32768, 32767)), 0, 0, 0)
         if name == "SYS_STATUS":
-            health = 1 << 16 if self.time - self._radio < 0.5 else 0
+            health = 1 << 16 if self._received else 0
             volts = round(self.volts * 1000)
             return self.mav.sys_status_encode(1 << 16, 1 << 16, health, 200, volts, 500, 80, 0, 0, 0, 0, 0, 0)
         if name == "RC_CHANNELS" and self.heard:

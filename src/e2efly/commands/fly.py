@@ -79,8 +79,8 @@ class Fly:
     image: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Source of each image that the policy's contract asks for, for policies with cameras: image_0=realsense:[SERIAL],
     v4l2:/dev/videoN?fov=AxB, ros1:/topic, ros2:/topic, hil:HOST:PORT, shm:NAME (shared memory that another program
-    writes), mask:...@URI (a mask made from one of these), or your own source, path/to/file.py:Name[:...]. See
-    docs/image-sources.md."""
+    writes), aigp:HOST:PORT (JPEG in datagrams), mask:...@URI (a mask made from one of these), or your own source,
+    path/to/file.py:Name[:...]. See docs/image-sources.md."""
     commands: str | None = None
     """Source of commands from another program, which flies in place of a policy: udp:PORT, ros1:/topic, ros2:/topic, or
     your own source, path/to/file.py:Name[:...]."""
