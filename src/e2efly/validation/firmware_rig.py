@@ -103,7 +103,8 @@ class FirmwareRig(Generic[Stepped]):
 
     Time is virtual. With `real_time` it follows the machine's clock, as for a bridge in another process. `step` is the
     interval at which sensors are updated and motors are read, s, a whole number of ms. `pose_noise` replaces
-    `POSE_NOISE`. `motors` are the firmware's motors, one for each rotor of the vehicle file. A subclass has `prepare`, `receive` and `autopilot`.
+    `POSE_NOISE`. `motors` are the firmware's motors, one for each rotor of the vehicle file. A subclass has `prepare`,
+    `receive` and `autopilot`.
     """
 
     boot_s: float
