@@ -1,6 +1,6 @@
 """Races by a camera and an IMU alone: the pose source `gates:` under the zoo's race policies, as they are.
 
-    python benchmarks/eyes.py [--flights 100] [--seed 7000000] [--rows] [--firmware 5] [--json FILE]
+    python benchmarks/eyes.py [--flights 50] [--seed 9000000] [--rows] [--firmware 5] [--json FILE]
 
 On MuJoCo, on four tracks of twice their size, on which such races are fast, and on random tracks. Each flight draws the
 mounting of its camera (2 degrees), the age of its images (20 to 60 ms, of which the estimator knows the middle), a
@@ -57,7 +57,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", flights=100, seed=7_000_000, rows=False, firmware=0)
+    args = arguments(__doc__ or "", flights=50, seed=9_000_000, rows=False, firmware=0)
     compute_at_once()
     prepare("cpu")
     path = args.json or RESULTS / "eyes.json"

@@ -57,6 +57,7 @@ TITLES = {
     "identify_structure": "Identification of hidden vehicles whose structure no vehicle file tells",
     "identify_structure_plain": "The same, fitted by a model without that structure",
     "tune": "From the log of a flight to a policy: hidden vehicles far from their file",
+    "eyes": "Races by a camera and an IMU alone",
     "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
     "step_alignment": "Alignment of hidden vehicles by a flight of steps",
     "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
@@ -92,7 +93,7 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "multirotor",
+            "multirotor", "eyes",
             "firmware_vehicles", "room_flights", "controllers", "filter", "plants_by_sight", "image_faults",
             "hil_rehearsal", "hil_room", "fault_campaign", "onboard", "c_export", "race_speed",
         ),
@@ -195,6 +196,11 @@ flies here. The file has the twenty faults, too. [PX4 and ArduCopter](mavlink.md
     "arducopter": """
 ArduPilot's own SITL program, which a user brings, over our rigid body behind its JSON interface, in virtual time. The
 file has the faults and the rows of `fly --check`, too. [The real ArduCopter](mavlink.md#the-real-arducopter).""",
+    "eyes": """
+No motion capture: the pose source `gates:` tells the vehicle where it is. Of each flight are drawn a camera mounted 2
+degrees askew, images 20 to 60 ms old, a rolling shutter, lost images, gates that stand 2 cm from the map, and an IMU
+with noise and biases. Tracks on MuJoCo; then rows that the estimator was not made for (its own size of four_gates), and
+the stress test; last, whole flights through the real firmware. [How it is done](eyes.md).""",
     "step_response": """
 VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.
