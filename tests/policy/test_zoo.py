@@ -60,8 +60,9 @@ def test_a_policy_is_of_the_configuration_beside_it(vehicle: str, task: str) -> 
     config = from_json(json.loads(config_file(file).read_text()), "")
     contract = evaluation.load_policy(file).contract
     told = contract_of(Setup.of(config).env, config)
-    # a policy of before the contracts had it does not say what it was trained to sense
-    assert dataclasses.replace(told, sensing=contract.sensing and told.sensing) == contract
+    # a policy of before the contracts had them does not say what it was trained to sense, and of others to know
+    known = {name: getattr(contract, name) and getattr(told, name) for name in ("sensing", "others")}
+    assert dataclasses.replace(told, **known) == contract
 
 
 def test_a_policy_was_trained_for_what_it_flies_without_options() -> None:
