@@ -10,8 +10,9 @@ from e2efly.flight.pose.neighbours import AGILE, LEAST, LOST_S, Neighbours
 from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.policy.goal import Shape
 from e2efly.policy.loader import load_policy
+from e2efly.policy.observation import Company
 from e2efly.policy.odometry import Odometry, Sample
-from e2efly.policy.others import FAR, USUAL, Company, company_of
+from e2efly.policy.others import FAR, USUAL, company_of
 from e2efly.policy.runtime import Runtime
 from e2efly.policy.zoo import policy_file
 from e2efly.tasks.swap.goal import SwapRoute

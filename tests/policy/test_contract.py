@@ -13,7 +13,7 @@ import pytest
 
 from e2efly.config.domain import Extent
 from e2efly.policy.contract import ACTION_MAPPING, Contract
-from e2efly.policy.others import Company
+from e2efly.policy.observation import Company
 
 Path = tuple[str | int, ...]
 

@@ -10,7 +10,8 @@ import pytest
 from e2efly.commands.cli import run
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import trace
-from e2efly.policy.others import FAR, Company
+from e2efly.policy.observation import Company
+from e2efly.policy.others import FAR
 from e2efly.validation.duels import duel
 from e2efly.validation.evaluation import SEED, act_of
 from e2efly.validation.plant import RigidState

@@ -129,7 +129,7 @@ def test_a_flight_that_broke_off_is_no_success_but_one_that_had_succeeded_stays_
         rows = {
             f.name: getattr(lap, f.name)
             for f in dataclasses.fields(lap)
-            if f.name not in ("success", "failure", "fault")
+            if f.name not in ("success", "failure", "fault", "estimate")
         }
         states = ("time", "position", "velocity", "quaternion", "body_rate")
         return Trajectory(**{n: x[: steps + (n in states)] for n, x in rows.items()}, fault="it broke")

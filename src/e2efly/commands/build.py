@@ -21,6 +21,7 @@ from e2efly.policy.loader import load_policy
 from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
+from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, read_sigmas
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -139,7 +140,8 @@ def plan(task: str, vehicle: Vehicle, file: Path, o: Build) -> PolicyPlan:
     """
     trains = task in o.train or (o.out / task / "config.json").exists()  # a training that began goes on
     having = [whose for whose, tasks in zoo.contents().items() if task in tasks and not trains]
-    for whose in sorted(having, key=lambda name: (name == presets.FAMILY, name != o.vehicle)):
+    families = family_names()
+    for whose in sorted(having, key=lambda name: (name in families, name != presets.FAMILY, name != o.vehicle)):
         contract = load_policy(f"{whose}/{task}").contract
         if not contract.misfits(vehicle):
             return PolicyPlan(task, f"{whose}/{task}", differences=contract.differences(vehicle))

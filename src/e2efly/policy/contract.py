@@ -18,8 +18,7 @@ from e2efly.control import COMMAND_MODES
 from e2efly.control.modes import THRUST
 from e2efly.policy import contract_json as read
 from e2efly.policy.images import Image
-from e2efly.policy.observation import OTHERS, PAST_ACTIONS, Field, Own, own_fields
-from e2efly.policy.others import Company
+from e2efly.policy.observation import OTHERS, PAST_ACTIONS, Company, Field, Own, own_fields
 from e2efly.policy.zoo import contents
 from e2efly.vehicles.family import OF_FRAMES, Ranges
 from e2efly.vehicles.gravity import GRAVITY

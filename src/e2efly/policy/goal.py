@@ -10,8 +10,8 @@ import numpy as np
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
-from e2efly.policy.observation import Field
-from e2efly.policy.others import Company, Others
+from e2efly.policy.observation import Company, Field
+from e2efly.policy.others import Others
 
 
 class Body(Protocol):

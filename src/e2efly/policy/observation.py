@@ -5,6 +5,7 @@ The training's environment, the runtime in flight and the export to C read this 
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -30,6 +31,28 @@ class Field:
     """The value, in that unit, that the network gets as 1."""
     description: str
     """How to compute it."""
+
+
+@dataclass(frozen=True)
+class Company:
+    """What a policy needs to know of the other vehicles: how many, what of them, how late and how far."""
+
+    count: int
+    """Number of the nearest others that it observes."""
+    fields: tuple[str, ...]
+    """Names of the observation fields that show them."""
+    max_age_s: float
+    """Largest age of another's pose, s. Until then it is taken to have flown on with its velocity."""
+    range_m: float
+    """Distance up to which they must be seen, m: the size of the worlds of the training."""
+    speed_m_s: float
+    """Largest speed of another, m/s: how fast one that is not seen may come nearer."""
+
+    @property
+    def told(self) -> str:
+        """What a source of their poses must give, in words."""
+        near = "" if math.isinf(self.range_m) else f"seen up to {self.range_m:.3g} m, "
+        return f"{near}at most {self.max_age_s:g} s old"
 
 
 ATTITUDE = Field("attitude", 4, "world_body", "1", 1.0, "unit quaternion wxyz, body to world")

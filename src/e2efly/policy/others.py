@@ -9,32 +9,10 @@ from typing import Any
 
 from e2efly.control.vectors import Array, namespace
 from e2efly.courses.origin import Origin
-from e2efly.policy.observation import OTHERS, Field
+from e2efly.policy.observation import OTHERS, Company, Field
 
 FAR = 50.0
 """Distance at which another vehicle is shown that is not there, m."""
-
-
-@dataclass(frozen=True)
-class Company:
-    """What a policy needs to know of the other vehicles: how many, what of them, how late and how far."""
-
-    count: int
-    """Number of the nearest others that it observes."""
-    fields: tuple[str, ...]
-    """Names of the observation fields that show them."""
-    max_age_s: float
-    """Largest age of another's pose, s. Until then it is taken to have flown on with its velocity."""
-    range_m: float
-    """Distance up to which they must be seen, m: the size of the worlds of the training."""
-    speed_m_s: float
-    """Largest speed of another, m/s: how fast one that is not seen may come nearer."""
-
-    @property
-    def told(self) -> str:
-        """What a source of their poses must give, in words."""
-        near = "" if math.isinf(self.range_m) else f"seen up to {self.range_m:.3g} m, "
-        return f"{near}at most {self.max_age_s:g} s old"
 
 
 USUAL = Company(0, (), 0.1, math.inf, 5.0)

@@ -10,8 +10,9 @@ from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.pace import Pace, paced
 from e2efly.flight.pose.pose_source import PoseSource
 from e2efly.flight.pose.tracking import PoseTrack, track
+from e2efly.policy.observation import Company
 from e2efly.policy.odometry import Odometry
-from e2efly.policy.others import USUAL, Company, Others, nobody
+from e2efly.policy.others import USUAL, Others, nobody
 
 AGILE = 30.0
 """Largest acceleration of another vehicle, m/s^2."""

@@ -10,7 +10,8 @@ import numpy as np
 from e2efly.control.vectors import Array
 from e2efly.courses.gates import Gates
 from e2efly.policy.goal import Course, Observed, Outcome, Shape
-from e2efly.policy.others import Company, Others, company_of, nobody, others_fields
+from e2efly.policy.observation import Company
+from e2efly.policy.others import Others, company_of, nobody, others_fields
 from e2efly.tasks.race.goal import GatesRoute, RaceGoal
 from e2efly.tasks.race.racing import Racing
 from e2efly.tasks.race_duel import RaceDuelConfig

@@ -12,8 +12,8 @@ from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Observed, Outcome, Shape
-from e2efly.policy.observation import Field
-from e2efly.policy.others import Company, Others, company_of, nobody, others_fields
+from e2efly.policy.observation import Company, Field
+from e2efly.policy.others import Others, company_of, nobody, others_fields
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.swap import SwapConfig
 from e2efly.tasks.verdicts import distance, held_longer, touches_ground
