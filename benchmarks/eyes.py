@@ -1,11 +1,13 @@
 """Races by a camera and an IMU alone: the pose source `gates:` under the zoo's race policies, as they are.
 
-    python benchmarks/eyes.py [--flights 100] [--seed 7000000] [--rows] [--firmware 5] [--json FILE]
+    python benchmarks/eyes.py [--flights 100] [--seed 7000000] [--rows | --colours | --firmware 5] [--json FILE]
 
 On MuJoCo, on four tracks of twice their size, on which such races are fast, and on random tracks. Each flight draws the
 mounting of its camera (2 degrees), the age of its images (20 to 60 ms, of which the estimator knows the middle), a
 rolling shutter of 16 ms, lost images (5 %), the places of the gates (2 cm from the map), and the errors of its IMU.
-With `--rows`, rows that the estimator was not made for, and the vehicles of the stress test. With `--firmware`, whole
+With `--rows`, rows that the estimator was not made for, and the vehicles of the stress test. With `--colours`, a camera
+that gives colours: the world has looks that were kept apart from what the package's network of gates has learned, and
+every image passes through the network. With `--firmware`, whole
 flights through the real Betaflight firmware, whose IMU comes by MSP. Parts that are not asked for stay as they are in
 the file.
 """
@@ -53,11 +55,13 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "an IMU of 100 Hz": {"imu_rate": 100.0},
 }  # fmt: skip
 """What differs from `GateCamera()`. The estimator is told the camera as it should be."""
+COLOURS: dict[str, dict[str, Any]] = {"from colours, looks kept apart": {"colours": True}}
+"""The same, of a camera that gives colours."""
 
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", flights=100, seed=7_000_000, rows=False, firmware=0)
+    args = arguments(__doc__ or "", flights=100, seed=7_000_000, rows=False, colours=False, firmware=0)
     compute_at_once()
     prepare("cpu")
     path = args.json or RESULTS / "eyes.json"
@@ -67,6 +71,8 @@ def main() -> None:
         if args.rows:
             parts["conditions"] = [condition(name, args.flights, args.seed) for name in CONDITIONS]
             parts["stress"] = stressed(args.flights // 4, args.seed)
+        elif args.colours:
+            parts["colours"] = [condition(name, args.flights, args.seed) for name in COLOURS]
         elif args.firmware:
             parts["firmware"] = firmware(args.firmware, args.seed)
         else:
@@ -90,8 +96,8 @@ def tracks(flights: int, seed: int, folder: Path) -> list[dict[str, Any]]:
 
 
 def condition(name: str, flights: int, seed: int) -> dict[str, Any]:
-    """A row of `CONDITIONS`, on the track and the policy of the zoo's fastest race."""
-    setup = GateCamera(**CONDITIONS[name])
+    """A row of `CONDITIONS` or `COLOURS`, on the track and the policy of the zoo's fastest race."""
+    setup = GateCamera(**(CONDITIONS | COLOURS)[name])
     return flown(name, "race", {"laps": 3, "episode_s": 20.0}, flights, seed, setup)
 
 

@@ -9,7 +9,7 @@ from onnx import NodeProto, TensorProto, helper
 
 from e2efly.flight.sight.segment import chosen
 from e2efly.flight.sight.segment.apriltag import FAMILIES, enlarged
-from e2efly.flight.sight.segment.network import PadNetwork
+from e2efly.flight.sight.segment.network import MaskNetwork
 
 WIDE, HIGH = 640, 480
 CORNERS = np.array([[250.0, 120.0], [410.0, 150.0], [395.0, 330.0], [230.0, 290.0]], np.float32)
@@ -164,7 +164,7 @@ def test_a_file_that_is_no_such_network_is_named(tmp_path: Path, content: bytes 
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(ValueError, match=said) as error:
-        PadNetwork(path)
+        MaskNetwork(path)
     assert str(path) in str(error.value)
     assert "accepted: an ONNX file" in str(error.value)
 
@@ -176,6 +176,20 @@ def test_the_network_of_the_package_finds_a_pad_and_no_other(ground: tuple[int, 
     bare = np.array(ground) + random.normal(0, 6, (HIGH, WIDE, 1))
     network = chosen("onnx")
     assert overlap(network(picture.clip(0, 255).astype(np.uint8)), inside) > 0.9
+    assert network(bare.clip(0, 255).astype(np.uint8)).mean() < 0.001
+
+
+def test_the_network_of_gates_finds_a_gate_and_no_other() -> None:
+    """Of one colour before two plain ones: a look that none of the renders has from which it has learned."""
+    outer = CORNERS.mean(0) + 1.2 * (CORNERS - CORNERS.mean(0))
+    bars, random = polygon(outer) & ~polygon(CORNERS) & 1, np.random.default_rng(0)
+    rows = np.arange(HIGH)[:, None, None]
+    bare = np.where(rows < 240, np.array([150, 170, 190]), np.array([110, 120, 100])) + random.normal(
+        0, 4, (HIGH, WIDE, 1)
+    )
+    picture = np.where(bars[..., None] > 0, np.array([220, 90, 30]), bare)
+    network = chosen("onnx:gates")
+    assert overlap(network(picture.clip(0, 255).astype(np.uint8)), bars) > 0.6
     assert network(bare.clip(0, 255).astype(np.uint8)).mean() < 0.001
 
 

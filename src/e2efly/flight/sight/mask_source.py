@@ -18,7 +18,7 @@ from e2efly.policy.images import NONE, Image
 
 WAIT_S = 0.001
 """Time between two checks for a new image, s."""
-FORM = "mask:apriltag:FAMILY[:ID[xFACTOR],...]@URI, mask:colour:H,S,V,H,S,V@URI or mask:onnx[:FILE]@URI"
+FORM = "mask:apriltag:FAMILY[:ID[xFACTOR],...]@URI, mask:colour:H,S,V,H,S,V@URI or mask:onnx[:pads|:gates|:FILE]@URI"
 
 
 def parts_of(text: str) -> tuple[str, str]:

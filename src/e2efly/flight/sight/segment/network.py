@@ -1,5 +1,6 @@
-"""Masks from a network that has learned what pads look like."""
+"""Masks from a network that has learned what an object looks like."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,29 @@ from e2efly.flight.sight.segment import SEGMENTERS, opencv
 from e2efly.policy.onnx_file import Message, file_content, read, write
 from e2efly.policy.onnx_session import open_session
 
-OWN = Path(__file__).parent / "pad.onnx"
-"""The network that is loaded if no file is named. `benchmarks/pad_masks.py --train` writes it."""
-LONGER_SIDE, STEP = 64, 16
-"""The input size of a network that accepts any size: pixels of the longer side. All sides are multiples of the step."""
+
+@dataclass(frozen=True)
+class ShippedNetwork:
+    """A network of the package, and the size of its input."""
+
+    path: Path
+    longer_side: int
+    """Pixels of the longer side. The aspect is that of the image."""
+    step: int
+    """All sides are multiples of this."""
+
+
+_HERE = Path(__file__).parent
+SHIPPED = {
+    "pads": ShippedNetwork(_HERE / "pad.onnx", 64, 16),
+    "gates": ShippedNetwork(_HERE / "gates.onnx", 320, 16),
+}
+"""By name. `benchmarks/pad_masks.py --train` and `benchmarks/gate_masks.py --train` write them."""
+USUAL = SHIPPED["pads"]
+"""What is loaded if nothing is named. A file's network that accepts any size is given an input of this one's size."""
 ACCEPTED = (
     "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
-    "the probability that a pixel shows the pad"
+    "the probability that a pixel shows the object"
 )
 LARGEST_SIDE = 2048
 """Largest number of rows or columns that a network may ask for."""
@@ -34,7 +51,7 @@ GROWING = ("Pad", "Resize")
 """Operators of which all inputs after the first are constants: these say how large the output is."""
 
 
-class PadNetwork:
+class MaskNetwork:
     """A mask of the pixels for which the network's probability is above one half."""
 
     def __init__(self, path: Path) -> None:
@@ -44,6 +61,7 @@ class PadNetwork:
             ValueError: naming the file, and how it differs from `ACCEPTED`.
         """
         self.path = path
+        self._size = next((own for own in SHIPPED.values() if own.path == path), USUAL)
         try:
             model = read(file_content(path))
             _check(model)
@@ -53,9 +71,9 @@ class PadNetwork:
             if len(shape) != 4 or shape[3] != 3 or not all(0 <= side <= LARGEST_SIDE for side in shape[1:3]):
                 raise ValueError(f"its input has the shape {shape}")
             self._name, self._sides = given.get("name", ""), (shape[1], shape[2])
-            black = np.zeros((1, *(side or LONGER_SIDE for side in self._sides), 3), np.float32)
-            self._session = open_session(write(model), [black], trusted=path == OWN)
-            self.probability(np.zeros((LONGER_SIDE, LONGER_SIDE, 3), np.uint8))
+            black = np.zeros((1, *(side or self._size.step for side in self._sides), 3), np.float32)
+            self._session = open_session(write(model), [black], trusted=path == self._size.path)
+            self.probability(np.zeros((self._size.longer_side,) * 2 + (3,), np.uint8))
         except Exception as error:  # any refusal of ONNX Runtime, or a wrong number of inputs or outputs
             said = str(error).strip().partition("\n")[0]
             raise ValueError(f"{path}: {said}; accepted: {ACCEPTED}") from None
@@ -68,16 +86,18 @@ class PadNetwork:
         return (larger > 0.5).astype(np.uint8)
 
     def probability(self, colours: np.ndarray) -> np.ndarray:
-        """The probability that a pixel shows the pad, float32, at the network's input size. `colours` is uint8 (h, w,
-        3), red first.
+        """The probability that a pixel shows the object, float32, at the network's input size.
+
+        Args:
+            colours: uint8 (h, w, 3), red first.
 
         Raises:
             ValueError: if the network's output does not have that size.
         """
         cv2 = opencv()
-        longer = max(colours.shape[:2])
+        longer, size = max(colours.shape[:2]), self._size
         rows, columns = (
-            own or max(STEP, round(side / longer * LONGER_SIDE / STEP) * STEP)
+            own or max(size.step, round(side / longer * size.longer_side / size.step) * size.step)
             for own, side in zip(self._sides, colours.shape, strict=False)
         )
         seen = cv2.resize(colours, (columns, rows), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
@@ -88,7 +108,8 @@ class PadNetwork:
 
     def describe(self) -> str:
         """The name of the network."""
-        return "the network of pads of benchmarks/pad_masks.py" if self.path == OWN else f"network {self.path}"
+        name = next((name for name, own in SHIPPED.items() if own.path == self.path), None)
+        return f"network {self.path}" if name is None else f"the network of {name} of the package"
 
 
 def _check(model: Message) -> None:
@@ -107,13 +128,14 @@ def _check(model: Message) -> None:
         constants |= set(node.get("output", [])) if kind == "Constant" else set()
 
 
-def open_onnx(text: str) -> PadNetwork:
-    """Load FILE. If it is omitted, load `OWN`.
+def open_onnx(text: str) -> MaskNetwork:
+    """Load a name of `SHIPPED`, or FILE. If it is omitted, load `USUAL`.
 
     Raises:
         ValueError: naming the file and what is accepted.
     """
-    return PadNetwork(Path(text).expanduser() if text else OWN)
+    own = SHIPPED.get(text or "pads")
+    return MaskNetwork(own.path if own else Path(text).expanduser())
 
 
 SEGMENTERS.add("onnx", open_onnx)
