@@ -79,7 +79,7 @@ def main() -> None:
             parts["tracks"] = tracks(args.flights, args.seed, Path(folder))
     for name, rows in parts.items():
         print(f"{name}:\n{table(rows)}")
-    others = [parts[name] for name in ("conditions", "stress", "firmware") if name in parts]
+    others = [parts[name] for name in ("conditions", "stress", "colours", "firmware") if name in parts]
     write("eyes", args.json, {"seed": args.seed, "parts": parts, "table": parts.get("tracks", []), "tables": others})
 
 
