@@ -1,13 +1,14 @@
 """Races by a camera and an IMU alone: the pose source `gates:` under the zoo's race policies, as they are.
 
-    python benchmarks/eyes.py [--flights 50] [--seed 9000000] [--rows] [--firmware 5] [--json FILE]
+    python benchmarks/eyes.py [--flights 50] [--seed 9000000] [--rows | --colours ONNX | --firmware 5]
 
 On MuJoCo, on four tracks of twice their size, on which such races are fast, and on random tracks. Each flight draws the
 mounting of its camera (2 degrees), the age of its images (20 to 60 ms, of which the estimator knows the middle), a
 rolling shutter of 16 ms, lost images (5 %), the places of the gates (2 cm from the map), and the errors of its IMU.
-With `--rows`, rows that the estimator was not made for, and the vehicles of the stress test. With `--firmware`, whole
-flights through the real Betaflight firmware, whose IMU comes by MSP. Parts that are not asked for stay as they are in
-the file.
+With `--rows`, rows that the estimator was not made for, and the vehicles of the stress test. With `--colours FILE`, a
+camera that gives colours: the world has looks that are kept apart from the training of `gate_masks.py`, and every image
+passes through the network in that file. With `--firmware`, whole flights through the real Betaflight firmware, whose
+IMU comes by MSP. Parts that are not asked for stay as they are in the file.
 """
 
 import dataclasses
@@ -57,7 +58,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", flights=50, seed=9_000_000, rows=False, firmware=0)
+    args = arguments(__doc__ or "", flights=50, seed=9_000_000, rows=False, colours="", firmware=0)
     compute_at_once()
     prepare("cpu")
     path = args.json or RESULTS / "eyes.json"
@@ -65,15 +66,19 @@ def main() -> None:
     parts = kept.get("parts", {})
     with tempfile.TemporaryDirectory() as folder:
         if args.rows:
-            parts["conditions"] = [condition(name, args.flights, args.seed) for name in CONDITIONS]
+            setups = {name: GateCamera(**changed) for name, changed in CONDITIONS.items()}
+            parts["conditions"] = [condition(name, setup, args.flights, args.seed) for name, setup in setups.items()]
             parts["stress"] = stressed(args.flights // 4, args.seed)
+        elif args.colours:
+            setup = GateCamera(colours=f"onnx:{args.colours}")
+            parts["colours"] = [condition("from colours, looks kept apart", setup, args.flights, args.seed)]
         elif args.firmware:
             parts["firmware"] = firmware(args.firmware, args.seed)
         else:
             parts["tracks"] = tracks(args.flights, args.seed, Path(folder))
     for name, rows in parts.items():
         print(f"{name}:\n{table(rows)}")
-    others = [parts[name] for name in ("conditions", "stress", "firmware") if name in parts]
+    others = [parts[name] for name in ("conditions", "stress", "colours", "firmware") if name in parts]
     write("eyes", args.json, {"seed": args.seed, "parts": parts, "table": parts.get("tracks", []), "tables": others})
 
 
@@ -89,9 +94,8 @@ def tracks(flights: int, seed: int, folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def condition(name: str, flights: int, seed: int) -> dict[str, Any]:
-    """A row of `CONDITIONS`, on the track and the policy of the zoo's fastest race."""
-    setup = GateCamera(**CONDITIONS[name])
+def condition(name: str, setup: GateCamera, flights: int, seed: int) -> dict[str, Any]:
+    """A camera on the track and under the policy of the zoo's fastest race."""
     return flown(name, "race", {"laps": 3, "episode_s": 20.0}, flights, seed, setup)
 
 

@@ -11,10 +11,10 @@ import jax
 import numpy as np
 import onnx
 from common import arguments, table, write
-from pad_network import graph, learned, weights_of
+from mask_network import PADS, graph, learned, weights_of
 from pad_renders import SEEN, SIDE, UNSEEN, Variety, pictures
 
-from e2efly.flight.sight.segment.network import OWN, PadNetwork
+from e2efly.flight.sight.segment.network import OWN, MaskNetwork
 
 BATCH = 256
 """Pictures that are drawn at once."""
@@ -31,7 +31,7 @@ def drawn(seed: int, n: int, variety: Variety) -> tuple[np.ndarray, np.ndarray]:
 
 def measured(name: str, colours: np.ndarray, truth: np.ndarray) -> list[dict[str, str]]:
     """Intersection over union of all pixels of all pictures, by the size of the pad."""
-    network = PadNetwork(OWN)
+    network = MaskNetwork(OWN)
     found = np.stack([network(picture) for picture in colours]).astype(bool)
     truth, sizes = truth.astype(bool), truth.sum((1, 2))
     rows = []
@@ -58,9 +58,9 @@ def main() -> None:
     """Train where it is asked for, measure, print the table, write the figures."""
     args = arguments(__doc__ or "", train=0, pictures=8192, more=0, unseen=512)
     if args.train:
-        before = weights_of(onnx.load(OWN)) if args.more else None
-        weights = learned(*drawn(1 + 10 * args.more, args.pictures, SEEN), args.train, weights=before)
-        OWN.write_bytes(graph(weights).SerializeToString())
+        before = weights_of(PADS, onnx.load(OWN)) if args.more else None
+        weights = learned(PADS, *drawn(1 + 10 * args.more, args.pictures, SEEN), args.train, weights=before)
+        OWN.write_bytes(graph(PADS, weights).SerializeToString())
         print(f"{OWN}: {OWN.stat().st_size} bytes")
     rows = measured("of the training's kinds, other seeds", *drawn(2, args.unseen, SEEN))
     rows += measured("of unseen outlines, markings and grounds", *drawn(3, args.unseen, UNSEEN))

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, UInt8
 
+from e2efly.simulation.scenes.textures import hashed, smooth, texture
 from e2efly.simulation.sensors.image_noise import gaussian, speckle
 
 SIDE = 64
@@ -24,7 +25,7 @@ LEVELS = 4
 
 @dataclass(frozen=True)
 class Variety:
-    """Which outlines, markings and grounds are drawn; numbers are those of `_outline`, `_marking` and `_ground`."""
+    """Which outlines, markings and grounds are drawn; numbers are those of `_outline`, `_marking` and `texture`."""
 
     outlines: tuple[int, ...]
     markings: tuple[int, ...]
@@ -71,59 +72,12 @@ def _marking(which: Array, x: Array, y: Array, size: Array, scale: Array) -> Arr
             lambda: jnp.zeros(x.shape, bool),
             lambda: (jnp.abs(jnp.abs(x) - 0.35) < bar) & (jnp.abs(y) < 0.5) | (jnp.abs(y) < bar) & (jnp.abs(x) < 0.35),
             lambda: jnp.abs(jnp.sqrt(x * x + y * y + 1e-9) - 0.55) < bar,
-            lambda: _hash(jnp.floor(x * cells), jnp.floor(y * cells), scale * 7.0) < 0.5,
+            lambda: hashed(jnp.floor(x * cells), jnp.floor(y * cells), scale * 7.0) < 0.5,
             lambda: size > 1 - 1.5 * bar,
             lambda: (middle < bar) & (size < 0.7),
             lambda: (jnp.floor(jnp.arctan2(y, x) / (jnp.pi / 4)) % 2 < 1) & (size < 0.8),
         ],
     )
-
-
-def _hash(i: Array, j: Array, seed: Array) -> Array:
-    """A number in [0, 1) of a place of a lattice."""
-    x = i.astype(jnp.int32).astype(jnp.uint32) * jnp.uint32(0x9E3779B1)
-    x ^= j.astype(jnp.int32).astype(jnp.uint32) * jnp.uint32(0x85EBCA77) + (seed * 1e4).astype(jnp.uint32)
-    x = (x ^ (x >> 15)) * jnp.uint32(0x2C1B3C6D)
-    x = (x ^ (x >> 12)) * jnp.uint32(0x297A2D39)
-    return (x ^ (x >> 15)).astype(jnp.float32) / 2.0**32
-
-
-def _smooth(x: Array, y: Array, seed: Array) -> Array:
-    """Smooth noise in [0, 1), features of about 1."""
-    i, j = jnp.floor(x), jnp.floor(y)
-    u, v = (w * w * (3 - 2 * w) for w in (x - i, y - j))
-    low, high = (_hash(i, j + k, seed) * (1 - u) + _hash(i + 1, j + k, seed) * u for k in (0, 1))
-    return low * (1 - v) + high * v
-
-
-def _ground(which: Array, x: Array, y: Array, u: Float[Array, " 4"]) -> Array:
-    """How much of its second colour the ground has, in [0, 1]."""
-    scale = 2.0 ** (3 * u[0])  # 1 to 8 a metre
-    x, y = x * scale, y * scale
-    i, j = jnp.floor(x), jnp.floor(y)
-
-    def tiles() -> Array:
-        joint = jnp.maximum(jnp.abs(x - i - 0.5), jnp.abs(y - j - 0.5)) > 0.46
-        return jnp.where(joint, 1.0, 0.4 * _hash(i, j, u[1]))
-
-    def planks() -> Array:
-        row = jnp.floor(2 * y)
-        return 0.6 * _hash(0 * row, row, u[1]) + 0.4 * _smooth(x, 14 * y, u[2])
-
-    def plates() -> Array:
-        row = jnp.floor(y / 0.866)
-        shifted = x + 0.5 * (row % 2)
-        at = jnp.floor(shifted)
-        return 0.7 * _hash(at, row, u[1]) + 0.3 * (jnp.abs(shifted - at - 0.5) > 0.45)
-
-    def gravel() -> Array:
-        return (_smooth(6 * x, 6 * y, u[1]) > 0.55) * _hash(jnp.floor(6 * x), jnp.floor(6 * y), u[2])
-
-    def noise() -> Array:
-        return 0.6 * _smooth(x, y, u[1]) + 0.4 * _smooth(9 * x, 9 * y, u[3])
-
-    kinds = [noise, tiles, planks, lambda: (i + j) % 2, plates, gravel]
-    return 0.8 * jax.lax.switch(which, kinds) + 0.2 * _smooth(3.1 * x, 3.1 * y, u[2])
 
 
 def _turned(x: Array, y: Array, angle: Array) -> tuple[Array, Array]:
@@ -185,15 +139,15 @@ def _picture(key: PRNGKeyArray, variety: Variety) -> tuple[Float[Array, "h w 3"]
     second = base + _between(u[11], 0.1, 0.8) * (second - base)
     gx, gy = meets(height + thick)
     tx, ty = _turned(gx + 10 * u[12], gy + 10 * u[13], 2 * jnp.pi * u[14])
-    share = _ground(ground, tx, ty, jax.random.uniform(keys[5], (4,)))[..., None]
+    share = texture(ground, tx, ty, jax.random.uniform(keys[5], (4,)))[..., None]
     colour = base[0] * (1 - share) + second[0] * share
     sx, _ = _turned(gx - aim_x, gy - aim_y, 2 * jnp.pi * u[15])
     strip = (jnp.abs(sx - _between(u[16], -1.5, 1.5)) < _between(u[17], 0.01, 0.06)) & (u[18] < 0.5)
-    stain = (_smooth(2 * tx, 2 * ty, u[19]) > 0.72) & (u[20] < 0.4)
+    stain = (smooth(2 * tx, 2 * ty, u[19]) > 0.72) & (u[20] < 0.4)
     px, py = 5 * tx, 5 * ty
     i, j = jnp.floor(px), jnp.floor(py)
     away = jnp.sqrt((px - i - 0.5) ** 2 + (py - j - 0.5) ** 2)
-    pebble = (away < 0.35 * _hash(i, j, u[21])) & (_hash(i, j, u[22]) < 0.2) & (u[23] < 0.4)
+    pebble = (away < 0.35 * hashed(i, j, u[21])) & (hashed(i, j, u[22]) < 0.2) & (u[23] < 0.4)
     colour = jnp.where((strip | stain | pebble)[..., None], 0.3 * colour + 0.7 * litter[0], colour)
     # the pad's shadow
     lx, ly = meets(height + thick)
@@ -205,7 +159,7 @@ def _picture(key: PRNGKeyArray, variety: Variety) -> tuple[Float[Array, "h w 3"]
     nearest = jnp.minimum(jnp.abs(several - base).max(-1), jnp.abs(several - second).max(-1))
     paint = several[jnp.argmax(nearest)]
     marked = _marking(marking, x, y, size, u[27])[..., None]
-    dirt = 1 - 0.25 * u[28] * _smooth(8 * x, 8 * y, u[29])[..., None]
+    dirt = 1 - 0.25 * u[28] * smooth(8 * x, 8 * y, u[29])[..., None]
     face = jnp.where(marked, mark[0], paint) * dirt
     colour = jnp.where(mantle[..., None], paint * _between(u[30], 0.3, 0.9), colour)
     colour = jnp.where(top[..., None], face, colour)

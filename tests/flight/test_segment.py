@@ -9,7 +9,7 @@ from onnx import NodeProto, TensorProto, helper
 
 from e2efly.flight.sight.segment import chosen
 from e2efly.flight.sight.segment.apriltag import FAMILIES, enlarged
-from e2efly.flight.sight.segment.network import PadNetwork
+from e2efly.flight.sight.segment.network import MaskNetwork
 
 WIDE, HIGH = 640, 480
 CORNERS = np.array([[250.0, 120.0], [410.0, 150.0], [395.0, 330.0], [230.0, 290.0]], np.float32)
@@ -164,7 +164,7 @@ def test_a_file_that_is_no_such_network_is_named(tmp_path: Path, content: bytes 
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(ValueError, match=said) as error:
-        PadNetwork(path)
+        MaskNetwork(path)
     assert str(path) in str(error.value)
     assert "accepted: an ONNX file" in str(error.value)
 

@@ -21,11 +21,13 @@ from e2efly.flight.pose.gates.error_state import AssumedNoise, ErrorState, quate
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
 from e2efly.flight.pose.gates.lens import Corners, Lens, Openings
 from e2efly.flight.sight.gate_corners import gate_corners
+from e2efly.flight.sight.segment import Segmenter, chosen
 from e2efly.policy.goal import Course
 from e2efly.policy.odometry import Odometry
 from e2efly.simulation.scenes import camera
 from e2efly.simulation.scenes.camera import Mount
 from e2efly.simulation.scenes.course import HALF_DEPTH, frames
+from e2efly.simulation.scenes.gate_looks import KEPT_APART, Look, coloured, drawn, photographed
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import imu_of
@@ -57,6 +59,9 @@ class GateCamera:
     """Standard deviation of the gates' places from the map, m per axis."""
     lost: float = 0.05
     """Share of the images that are lost."""
+    colours: str = ""
+    """The segmenter that finds the gates in colours, such as onnx:FILE. Each flight draws looks of the kinds
+    `KEPT_APART`. Empty: the camera gives the mask of the gates."""
     imu: ImuConfig = ImuConfig(True, gyro_noise=1.3e-3, accel_noise=2e-2)
     """White noise of the IMU: vibration, too."""
     imu_rate: float = 250.0
@@ -120,6 +125,10 @@ class GateEyes:
     latency: float
     """Age of the images, s."""
     random: np.random.Generator
+    look: Look | None = None
+    """How the world looks: a row for each band of rows. None: the camera gives a mask."""
+    segmenter: Segmenter | None = None
+    """Makes a mask of colours."""
     problem: None = None
     _past: list[tuple[float, RigidState]] = field(default_factory=list)
     _coming: list[tuple[float, float]] = field(default_factory=list)
@@ -138,7 +147,12 @@ class GateEyes:
             jnp.asarray(x, jnp.float32) for x in (c.angle_spread * u[:, :3], c.position_spread * u[:, 5:])
         )
         whole = camera.mounted(c, angles, jnp.asarray(1 + c.fov_spread * u[:, 3:4], jnp.float32), offset)
-        return GateEyes(setup, known, scene, banded(whole), float(random.uniform(*c.latency)), random)
+        look = segmenter = None
+        if setup.colours:
+            one = drawn(jax.random.key(seed), 1, KEPT_APART)
+            look = jax.tree.map(lambda leaf: jnp.repeat(jnp.asarray(leaf), BANDS, axis=0), one)
+            segmenter = chosen(setup.colours)
+        return GateEyes(setup, known, scene, banded(whole), float(random.uniform(*c.latency)), random, look, segmenter)
 
     def see(self, now: float, state: RigidState) -> list[tuple[float, Corners]]:
         """The corners in the images that arrive until `now`, s, with the stamps of the images, s.
@@ -168,8 +182,11 @@ class GateEyes:
         turns = [quaternion_of(rotation_of(s.quaternion) @ turned((time - at) * s.body_rate)) for time, at, s in near]
         c = self.setup.camera
         band = dataclasses.replace(c, height=c.height // BANDS)
-        rows = _look(band, self.scene, self.mount, position.astype(np.float32), np.array(turns, np.float32))
-        return np.asarray(rows).reshape(c.height, c.width)
+        where = self.scene, self.mount, position.astype(np.float32), np.array(turns, np.float32)
+        if self.look is None or self.segmenter is None:
+            return np.asarray(_look(band, *where)).reshape(c.height, c.width)
+        colours = np.asarray(coloured(band, *where, self.look)[0]).reshape(c.height, c.width, 3)
+        return self.segmenter(photographed(colours, self.look, c.width / 640, self.random))
 
 
 @dataclass

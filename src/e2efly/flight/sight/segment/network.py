@@ -15,7 +15,7 @@ LONGER_SIDE, STEP = 64, 16
 """The input size of a network that accepts any size: pixels of the longer side. All sides are multiples of the step."""
 ACCEPTED = (
     "an ONNX file with one input, float32 (n, h, w, 3), red, green, blue in [0, 1], and one output, float32 (n, h, w), "
-    "the probability that a pixel shows the pad"
+    "the probability that a pixel shows the object"
 )
 LARGEST_SIDE = 2048
 """Largest number of rows or columns that a network may ask for."""
@@ -34,7 +34,7 @@ GROWING = ("Pad", "Resize")
 """Operators of which all inputs after the first are constants: these say how large the output is."""
 
 
-class PadNetwork:
+class MaskNetwork:
     """A mask of the pixels for which the network's probability is above one half."""
 
     def __init__(self, path: Path) -> None:
@@ -107,13 +107,13 @@ def _check(model: Message) -> None:
         constants |= set(node.get("output", [])) if kind == "Constant" else set()
 
 
-def open_onnx(text: str) -> PadNetwork:
+def open_onnx(text: str) -> MaskNetwork:
     """Load FILE. If it is omitted, load `OWN`.
 
     Raises:
         ValueError: naming the file and what is accepted.
     """
-    return PadNetwork(Path(text).expanduser() if text else OWN)
+    return MaskNetwork(Path(text).expanduser() if text else OWN)
 
 
 SEGMENTERS.add("onnx", open_onnx)
