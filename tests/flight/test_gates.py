@@ -276,12 +276,22 @@ def test_a_vehicle_that_stands_stays_where_it_is_for_a_minute() -> None:
     np.testing.assert_allclose(source.estimator.state.gyro_bias, bias, atol=2e-3)  # type: ignore[union-attr]
 
 
-def test_a_pause_of_the_imu_in_flight_ends_the_poses() -> None:
+def test_after_a_pause_of_the_imu_in_flight_there_are_no_poses_until_it_stands() -> None:
     source = GateSource(setup_of(), Nothing())
-    for at in (0.0, 0.01, 0.02, 0.5):
-        source.feel(at, np.zeros(3), np.array([0, 0, 9.8]), standing=False)
-    assert source.read(0.5) == []
-    assert "silent for 0.48 s" in (source.problem or "")
+    for at in (0.0, 0.01, 0.02, 0.5, 0.51, 0.52):
+        source.feel(at, np.zeros(3), np.array([0, 0, 9.8]), standing=at == 0.0)
+        assert len(source.read(at)) == (at < 0.5)
+        if at == 0.5:
+            assert "silent for 0.48 s" in (source.problem or "")
+    source.feel(0.53, np.zeros(3), np.array([0, 0, 9.8]), standing=True)
+    assert len(source.read(0.53)) == 1
+
+
+def test_a_vehicle_that_is_carried_does_not_learn_that_it_stands() -> None:
+    source = GateSource(setup_of(), Nothing())
+    for k in range(300):
+        source.feel(0.01 * k, np.array([0.0, 0.0, 0.8 * (k > 100)]), np.array([0, 0, 9.8]), standing=True)
+    assert np.linalg.norm(source.estimator.state.gyro_bias) < 0.05  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(

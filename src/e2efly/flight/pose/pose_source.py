@@ -56,7 +56,7 @@ class AidedSource(PoseSource, Protocol):
             time: when it was taken, s.
             gyroscope: (3,) body rate, rad/s.
             force: (3,) specific force, body, m/s^2.
-            standing: the vehicle stands still on the ground.
+            standing: the vehicle is on the ground, disarmed. It may be carried.
         """
         ...
 

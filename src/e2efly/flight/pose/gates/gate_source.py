@@ -9,6 +9,7 @@ from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSampl
 from e2efly.flight.pose.gates.gate_setup import GateSetup
 from e2efly.flight.pose.gates.lens import Corners, Openings
 from e2efly.policy.odometry import Sample
+from e2efly.vehicles.gravity import GRAVITY
 
 HALF_DEPTH = 0.05
 """Half the depth of a gate's bars, m."""
@@ -16,6 +17,10 @@ LARGEST = 0.5
 """Standard deviation of the position above which there is no pose, m."""
 PAUSE_S = 0.2
 """After a pause of the IMU longer than this, s, nothing is known any more."""
+
+
+TURNING, SHAKEN = 0.15, 0.6
+"""A vehicle that turns faster, rad/s, or whose specific force differs more from gravity, m/s^2, is carried."""
 
 
 class Looks(Protocol):
@@ -66,22 +71,20 @@ class GateSource:
             time: when it was taken, s.
             gyroscope: (3,) body rate, rad/s.
             force: (3,) specific force, body, m/s^2.
-            standing: the vehicle stands still on the ground.
+            standing: the vehicle is on the ground, disarmed. It may be carried.
         """
         estimator, last = self._estimator, self._last
         self._last = gyroscope, force
-        if estimator is None or last is None or (time - estimator.state.time > PAUSE_S and standing):
-            self._estimator = self._placed(time)
-            return
-        dt = time - estimator.state.time
-        if dt > PAUSE_S:
-            self.problem = f"{self._name}: the IMU was silent for {dt:.2f} s; accepted: at most {PAUSE_S:g} s"
-            self._estimator = None
+        dt = np.inf if estimator is None else time - estimator.state.time
+        if estimator is None or last is None or dt > PAUSE_S:
+            if estimator is not None:
+                self.problem = f"{self._name}: the IMU was silent for {dt:.2f} s; accepted: at most {PAUSE_S:g} s"
+            self._estimator = self._placed(time) if standing else None  # in the air it may be anywhere
             return
         # two samples at the ends of the interval; the mean of what they say, in the axes at its end
         turn = turned(0.5 * (last[0] + gyroscope) * dt)
         estimator.feel(InertialSample(time, gyroscope, 0.5 * (force + turn.T @ last[1])))
-        if standing:
+        if standing and np.linalg.norm(gyroscope) < TURNING and abs(np.linalg.norm(force) - GRAVITY) < SHAKEN:
             estimator.rest(gyroscope)
 
     def read(self, now: float) -> list[Sample]:
