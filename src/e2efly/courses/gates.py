@@ -14,6 +14,8 @@ from e2efly.courses.tracks import RaceTrack
 
 FRAME = 0.1
 """Width of a gate's frame around its opening, m."""
+HALF_DEPTH = 0.05
+"""Half the depth of a gate's bars, m."""
 STRAIGHT_ON = 3.0
 """Distance of the point after the last gate of an open track, straight on, m."""
 BURIED = -1000.0

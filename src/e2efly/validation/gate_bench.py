@@ -66,5 +66,5 @@ def gate_poses(rig: FlightBench, setup: GateCamera, course: Course, seed: int) -
     heading = known.start_yaw if course.heading is None else course.heading
     start = np.array([x, y, rig.world.vehicle.feet_height, heading + origin.yaw])
     c = setup.camera
-    told = GateSetup(track, start, setup.lens, c.rate or 30.0, float(np.mean(c.latency)), setup.noise)
+    told = GateSetup(track, start, setup.lens, c.rate or 30.0, 0.0, setup.noise)  # stamps are of the exposure
     return LatePoses(told, RigLooks(GateEyes.of(setup, track, seed), lambda: rig.state), rig.latency)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from e2efly.config import CameraConfig, ImuConfig
-from e2efly.courses.gates import Gates
+from e2efly.courses.gates import HALF_DEPTH, Gates
 from e2efly.courses.tracks import RaceTrack
 from e2efly.flight.pose.gates.error_state import AssumedNoise, ErrorState, quaternion_of, rotation_of, turned
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
@@ -26,7 +26,7 @@ from e2efly.policy.goal import Course
 from e2efly.policy.odometry import Odometry
 from e2efly.simulation.scenes import camera
 from e2efly.simulation.scenes.camera import Mount
-from e2efly.simulation.scenes.course import HALF_DEPTH, frames
+from e2efly.simulation.scenes.course import frames
 from e2efly.simulation.scenes.gate_looks import KEPT_APART, Look, coloured, drawn, photographed
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.validation.plant import RigidState

@@ -30,9 +30,10 @@ def relay(speech: Speech, about: str, uri: str) -> None:
         speech.say("ready", source.describe())
         while not speech.closing.is_set():
             frames = source.read(time.monotonic())
-            if source.problem != told and source.problem:
-                speech.say("problem", source.problem)
-            told = source.problem
+            if source.problem != told:
+                told = source.problem
+                words = ("problem", told) if told else ("solved",)
+                speech.say(*words)
             for frame in frames:
                 found = gate_corners(np.asarray(frame.image))
                 content = {"stamp": frame.time, "pixel": found.pixel.tolist(), "inward": found.inward.tolist()}

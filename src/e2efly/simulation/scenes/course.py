@@ -4,14 +4,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from e2efly.courses.gates import FRAME, Gates, Tracks
+from e2efly.courses.gates import FRAME, HALF_DEPTH, Gates, Tracks
 from e2efly.simulation.scenes.scene import Solids
 
 for _kind in (Gates, Tracks):
     jax.tree_util.register_dataclass(_kind, data_fields=list(_kind.__dataclass_fields__), meta_fields=[])
-
-HALF_DEPTH = 0.05
-"""Half the depth of a gate's bars, m."""
 
 
 def frames(gates: Gates, n: int, bar: float | Array = FRAME, active: bool | Array = True) -> Solids:

@@ -37,7 +37,7 @@ class GateSetup:
     rate: float
     """Images per second."""
     latency: float
-    """Usual time from the exposure of an image to its arrival, s."""
+    """Usual time from the exposure of an image to its stamp, s."""
     noise: AssumedNoise = AssumedNoise()
     """What the estimator assumes of its sensors."""
 

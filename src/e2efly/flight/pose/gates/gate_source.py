@@ -4,6 +4,7 @@ from typing import Protocol
 
 import numpy as np
 
+from e2efly.courses.gates import HALF_DEPTH
 from e2efly.flight.pose.gates.error_state import ErrorState, quaternion_of, turned
 from e2efly.flight.pose.gates.gate_estimator import GateEstimator, InertialSample
 from e2efly.flight.pose.gates.gate_setup import GateSetup
@@ -11,14 +12,10 @@ from e2efly.flight.pose.gates.lens import Corners, Openings
 from e2efly.policy.odometry import Sample
 from e2efly.vehicles.gravity import GRAVITY
 
-HALF_DEPTH = 0.05
-"""Half the depth of a gate's bars, m."""
 LARGEST = 0.5
 """Standard deviation of the position above which there is no pose, m."""
 PAUSE_S = 0.2
 """After a pause of the IMU longer than this, s, nothing is known any more."""
-
-
 TURNING, SHAKEN = 0.15, 0.6
 """A vehicle that turns faster, rad/s, or whose specific force differs more from gravity, m/s^2, is carried."""
 
@@ -32,9 +29,7 @@ class Looks(Protocol):
         ...
 
     def read(self, now: float) -> list[tuple[float, Corners]]:
-        """What has come since the last call, at `now`, s: the time of exposure by the clock of the images, s, and the
-        corners.
-        """
+        """What has come since the last call, at `now`, s: the stamp of the image, s, and its corners."""
         ...
 
     def close(self) -> None:
@@ -65,14 +60,7 @@ class GateSource:
         return self._estimator
 
     def feel(self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool) -> None:
-        """A sample of the IMU.
-
-        Args:
-            time: when it was taken, s.
-            gyroscope: (3,) body rate, rad/s.
-            force: (3,) specific force, body, m/s^2.
-            standing: the vehicle is on the ground, disarmed. It may be carried.
-        """
+        """See `AidedSource.feel`."""
         estimator, last = self._estimator, self._last
         self._last = gyroscope, force
         dt = np.inf if estimator is None else time - estimator.state.time
@@ -94,7 +82,7 @@ class GateSource:
             self.problem = self.problem or f"{self._name}: the IMU has not been heard"
             return []
         for stamp, corners in looks:
-            estimator.look(corners, stamp)
+            estimator.look(corners, stamp - self._setup.latency)
         state = estimator.state
         doubt = float(np.sqrt(np.trace(state.covariance[:3, :3])))
         if doubt > LARGEST:

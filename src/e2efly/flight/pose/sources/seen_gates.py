@@ -41,7 +41,6 @@ class CornerRelay:
         Raises:
             ValueError: with what the process reports about its failure.
         """
-        self.refused = 0
         self.problem: str | None = None
         try:
             self._child = Child(sys.executable, "gate_relay.py", about, uri)
@@ -56,8 +55,8 @@ class CornerRelay:
             kind, _, rest = line.partition(b" ")
             if kind == b"message":
                 found.append(parse_corners(rest.partition(b" ")[2]))
-            elif kind == b"problem":
-                self.problem = text_of(rest)
+            else:
+                self.problem = None if kind == b"solved" else text_of(rest)
         return found
 
     def close(self) -> None:
