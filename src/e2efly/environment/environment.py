@@ -48,8 +48,9 @@ from e2efly.environment.env_state import (
 )
 from e2efly.environment.limits import latencies_of, limits_of, posterior_of
 from e2efly.environment.privileged import OTHER_SIZE, SCENE_SIZE, of_others, of_scene
-from e2efly.environment.rules import check
+from e2efly.environment.rules import check, hidden
 from e2efly.environment.signals import dangers, happened
+from e2efly.policy.goal import Goal
 from e2efly.policy.observation import Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, State, started, step
@@ -185,6 +186,8 @@ class Env:
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         flown_task = _flown_task(task, shape, physics)
+        mine = own_fields(imu=config.imu.observed, actions=seen, size=len(low))
+        unseen = hidden(task, flown_task, [row.field for row in mine])
         if getattr(flown_task, "agents", 1) == 1:
             for name, off in (("downwash", 0), ("central_critic", False)):
                 if value := getattr(config, name):
@@ -220,6 +223,7 @@ class Env:
             past=latency.frames(oldest, period) + 1 if oldest else 0,
             family=family if flown is None else None,
             central=config.central_critic,
+            unseen=unseen,
         )
 
     def on(self, task: TaskConfig) -> "Env":
@@ -287,9 +291,15 @@ class Env:
         return tuple(row for row in rows if row.field.name not in self.unseen)
 
     def showing(self, names: Sequence[str]) -> "Env":
-        """The same environment, with only those of the vehicle's own fields that have these names."""
-        hidden = (row.field.name for row in self._own if row.field.name not in names)
-        return dataclasses.replace(self, unseen=(*self.unseen, *hidden))
+        """The same environment, with an observation of only those fields that have these names."""
+        task, every = self.task, dataclasses.replace(self, unseen=())
+        if isinstance(task, Goal) and isinstance(task.config, TaskConfig):
+            config = dataclasses.replace(task.config.showing(names), observes=None)
+            task = dataclasses.replace(task, config=config)
+            if any(field.name not in names for field in task.fields):
+                task = dataclasses.replace(task, config=dataclasses.replace(config, observes=tuple(names)))
+        unseen = tuple(row.field.name for row in every._own if row.field.name not in names)
+        return dataclasses.replace(self, task=task, unseen=unseen)
 
     @property
     def observation_size(self) -> int:
