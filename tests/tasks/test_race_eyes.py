@@ -8,12 +8,15 @@ import pytest
 
 from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, random_key
+from e2efly.policy.goal import Shape
 from e2efly.runs.presets import preset
+from e2efly.simulation.physics import State
 from e2efly.tasks import TASKS
-from e2efly.tasks.race_eyes import SENSED, RaceEyesConfig
-from e2efly.vehicles.loading import load_vehicle
+from e2efly.tasks.race_eyes import SENSED
+from e2efly.tasks.race_eyes.goal import RaceEyesRoute
+from e2efly.vehicles.gravity import GRAVITY
 
-REWARD = RewardConfig({"progway": 1.0})
+REWARD_OF_HOVER = RewardConfig({"prog2": 1.0})
 
 
 def made(**changes: object) -> Env:
@@ -26,7 +29,7 @@ def test_a_policy_is_told_neither_where_it_is_nor_where_the_gates_are() -> None:
     assert tuple(field.name for field in env.fields) == SENSED
     state, observation = env.reset(random_key(0), 4)
     moved = dataclasses.replace(state.vehicle, position=state.vehicle.position + 5, velocity=state.vehicle.velocity + 3)
-    np.testing.assert_array_equal(env.shown(state, moved), observation)
+    np.testing.assert_allclose(env.shown(state, moved), observation, atol=1e-6)
     assert observation.shape == (4, env.observation_size)
     (image,) = state.images
     assert image.max() == 1.0 and image.mean() < 0.5  # the first gate
@@ -48,21 +51,25 @@ def test_names_choose_what_a_policy_observes_of_any_task() -> None:
         np.testing.assert_array_equal(told.shown(state, state.vehicle), np.concatenate(parts, axis=1))
 
 
-REWARD_OF_HOVER = RewardConfig({"prog2": 1.0})
-
-
 @pytest.mark.parametrize(
     ("names", "said"),
     [
         (("attitude", "speed"), "task.observes has speed; accepted: some of position_error, attitude, velocity"),
         (("velocity",), "task.observes is velocity; accepted: with attitude"),
         ((), "task.observes is empty; accepted: with attitude"),
-        (("attitude", "gyroscope"), "task.observes has gyroscope; accepted"),  # there is no IMU
     ],
 )
 def test_what_cannot_be_observed_is_refused_by_name(names: tuple[str, ...], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Env.of(TASKS["hover"](observes=names), REWARD_OF_HOVER, EnvConfig())
+
+
+def test_a_task_that_observes_an_imu_has_one() -> None:
+    names = ("attitude", "accelerometer")
+    env = Env.of(TASKS["hover"](observes=names), REWARD_OF_HOVER, EnvConfig())
+    assert {field.name for field in env.fields} == set(names)
+    _, observation = env.reset(random_key(0), 2)
+    np.testing.assert_allclose(np.linalg.norm(observation[:, -3:], axis=1), GRAVITY, rtol=1e-5)  # at rest
 
 
 def test_its_worlds_are_the_tracks_enlarged_with_displaced_gates() -> None:
@@ -77,17 +84,13 @@ def test_its_worlds_are_the_tracks_enlarged_with_displaced_gates() -> None:
 
 
 def test_a_route_enlarges_its_track_and_its_goal_shows_nothing() -> None:
-    from e2efly.policy.goal import Shape
-    from e2efly.tasks.race_eyes.goal import RaceEyesRoute
-
-    course = RaceEyesRoute(scale=2.0, laps=2).course(Shape(0.05, 0.15), 1 / 30)
-    assert course.goal.fields == () and course.goal.config.laps == 2
-    body = load_vehicle("vis_r")
-    assert body.hash and isinstance(course.goal.config, RaceEyesConfig)
-    wide = np.ptp(np.asarray(course.points)[..., 0])
-    assert wide == pytest.approx(
-        2 * np.ptp(np.asarray(RaceEyesRoute(scale=1.0).course(Shape(0.05, 0.15), 1 / 30).points)[..., 0]), rel=0.2
-    )
+    near, far = (RaceEyesRoute(scale=k, laps=k).course(Shape(0.05, 0.15), 1 / 30) for k in (1, 2))
+    assert far.goal.fields == () and far.goal.config.laps == 2
+    here = State(far.start[None], *(np.zeros((1, size)) for size in (3, 4, 3, 4)))  # type: ignore[arg-type]
+    assert far.goal.observe(far.memory, np.zeros(1), here).shape == (1, 0)
+    np.testing.assert_allclose(far.start[:2], 2 * near.start[:2])
+    away = np.linalg.norm(far.start - far.goal.goal(far.memory, np.zeros(1))[0])
+    assert far.goal.config.fence < away < far.goal.fence(far.memory)[0], "it may begin as far off as a start is"
 
 
 def test_the_same_program_serves_every_draw() -> None:

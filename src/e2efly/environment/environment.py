@@ -51,7 +51,7 @@ from e2efly.environment.privileged import OTHER_SIZE, SCENE_SIZE, of_others, of_
 from e2efly.environment.rules import check, hidden
 from e2efly.environment.signals import dangers, happened
 from e2efly.policy.goal import Goal
-from e2efly.policy.observation import Field, Known, Own, own_fields
+from e2efly.policy.observation import OWN, Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
@@ -66,6 +66,8 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 from e2efly.vehicles.vehicle import Flown
 
+INERTIAL_FIELDS = tuple(row.field.name for row in OWN if row.source == "imu")
+"""Names of the fields of an IMU. A task that names one to be observed has an IMU."""
 DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
@@ -186,7 +188,8 @@ class Env:
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         flown_task = _flown_task(task, shape, physics)
-        mine = own_fields(imu=config.imu.observed, actions=seen, size=len(low))
+        felt = config.imu.observed or any(field in (task.observes or ()) for field in INERTIAL_FIELDS)
+        mine = own_fields(imu=felt, actions=seen, size=len(low))
         unseen = hidden(task, flown_task, [row.field for row in mine])
         if getattr(flown_task, "agents", 1) == 1:
             for name, off in (("downwash", 0), ("central_critic", False)):
@@ -216,7 +219,7 @@ class Env:
             link=None if config.link == LinkConfig() else config.link,
             noise=config.noise if noisy else None,
             payload=config.payload if config.payload.mass[1] else None,
-            imu=config.imu if config.imu.observed else None,
+            imu=config.imu if felt else None,
             cameras=config.cameras,
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,

@@ -11,7 +11,6 @@ from e2efly.config import (
     CameraConfig,
     DAggerConfig,
     EnvConfig,
-    ImuConfig,
     NetworkConfig,
     PPOConfig,
     RewardConfig,
@@ -101,7 +100,7 @@ class RaceEyesConfig(TaskConfig):
             weights |= {"fitlog": 1.0, "anglev_sq": 0.0005, "act2_sq": 0.005, "goal": 1.0, "crash": 1.0}
         return TrainConfig(
             cls.training(), settings, RewardConfig(weights, {"fitlog_margin": 0.12}),
-            EnvConfig(cameras=cls.cameras, imu=ImuConfig(observed=True)),
+            EnvConfig(cameras=cls.cameras),
             NetworkConfig((128, 96), pool=(18, 32), encoder=(96,), recurrent=128),
             steps=20_000_000, chunk=300, eval_episodes=500, fast_compile=False,
         )  # fmt: skip
