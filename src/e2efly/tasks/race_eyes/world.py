@@ -30,11 +30,14 @@ class RaceEyes(AnyRace):
         """Load the tracks.
 
         Raises:
-            ValueError: for an unknown or broken track, and for tracks that `several` refuses.
+            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
+                is not among them.
         """
         given = several(config.track, config.scale)
         if config.laps > 1 and not given.closed.all():
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as not all of the tracks are closed")
+        if config.only not in range(-1, len(config.track)):
+            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {len(config.track) - 1}")
         # the tracks are resolved here, so that they share a compiled program
         return RaceEyes(dataclasses.replace(config, track=("",) * len(config.track)), shape, given)
 
@@ -42,6 +45,6 @@ class RaceEyes(AnyRace):
         """At rest and level in a ball around the start of a track, with the heading of the track."""
         track_key, state_key = jax.random.split(key)
         c = self.config
-        tracks = displaced(track_key, n, self.given, c.gate_position, c.gate_yaw)
+        tracks = displaced(track_key, n, self.given, c.gate_position, c.gate_yaw, c.only)
         state = begun(state_key, n, c.position, self.shape, tracks.gates.start, tracks.gates.start_yaw)
         return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32), jnp.full(n, jnp.inf))
