@@ -65,7 +65,7 @@ VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors
 """Policies of a task by a preset of its own: task and preset."""
 ALONE = {
     "race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_payload": USUAL,
-    "race_duel": USUAL, "hover_rotors": presets.FAMILY,
+    "race_duel": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
 }  # fmt: skip
 """For this vehicle alone."""
 FRAMES = "multirotor"

@@ -124,6 +124,6 @@ class RaceEyesConfig(TaskConfig):
         return TrainConfig(
             cls.training(), settings, RewardConfig(weights, {"fitlog_margin": 0.12}),
             ABOUT,
-            NetworkConfig((128, 96), pool=(18, 32), encoder=(96,), recurrent=128),
+            NetworkConfig((96, 96), pool=(18, 32), encoder=(96,), recurrent=128),
             steps=20_000_000, chunk=300, eval_episodes=250, fast_compile=False,
         )  # fmt: skip
