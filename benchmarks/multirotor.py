@@ -25,7 +25,8 @@ from e2efly.environment import UNSEEN, Env, EnvState, random_key
 from e2efly.environment.episodes import Episodes, run_stepwise
 from e2efly.policy.runtime import Runtime
 from e2efly.simulation.device import prepare
-from e2efly.validation.evaluation import Candidate, act_of, candidate
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import act_of
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import flying, together
 from e2efly.validation.plants import find_plant

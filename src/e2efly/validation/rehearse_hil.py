@@ -22,7 +22,7 @@ from e2efly.flight.sight.shared import place
 from e2efly.policy.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.bridge_session import rehearsal_settings
-from e2efly.validation.evaluation import Candidate
+from e2efly.validation.candidate import Candidate
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
 from e2efly.validation.processes import (
