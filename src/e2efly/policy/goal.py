@@ -150,6 +150,10 @@ class Goal:
         """(n, 3) position to be at now, world, m."""
         raise NotImplementedError
 
+    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
+        """(n, 3) the position to be at now minus that of the body, world, m: a field of many tasks."""
+        return self.goal(memory, time) - body.position
+
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:
         """The place at which a controller that is not a policy is to be, from a policy's observation.

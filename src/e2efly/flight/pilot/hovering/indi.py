@@ -46,7 +46,7 @@ class FeltResponse:
 @register("indi")
 @dataclass(frozen=True)
 class Indi:
-    """The controller. Its memory is `Felt`.
+    """The controller. Its memory is `FeltResponse`.
 
     If the rotor speeds are not known, the thrust is that of the commands after the lag of the motors.
     """
