@@ -18,17 +18,7 @@ from jax import Array
 
 from e2efly.alignment.least_squares import HUBER, huber, jackknife
 from e2efly.alignment.misfit import LeftOver, left_over, white_by
-from e2efly.alignment.model import (
-    FACTOR,
-    FORCE,
-    GYRO,
-    NUISANCES,
-    WIND,
-    Model,
-    attitude_error,
-    from_zero,
-    simulate,
-)
+from e2efly.alignment.model import FACTOR, FORCE, GYRO, NUISANCES, WIND, Model, attitude_error, from_zero, simulate
 from e2efly.alignment.windows import LENGTH, Windows
 
 NOISE = {

@@ -246,11 +246,7 @@ class Bridge:
             override=report.override,
             pilot=report.pilot,
             voltage=report.voltage,
-            settings_problems=(
-                *self.settings_problems,
-                *report.problems,
-                *((slow,) if slow else ()),
-            ),
+            settings_problems=(*self.settings_problems, *report.problems, *((slow,) if slow else ())),
             policy_problem=report.policy_problem or self._blindness(now) or self._unfiltered,
             filtered=self.keeper is not None,
             attitude_error=told.attitude_error(report.attitude),

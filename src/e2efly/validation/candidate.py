@@ -247,10 +247,7 @@ def pinned(env: EnvConfig, policy: Acting) -> EnvConfig:
     """The same environment, which keeps rate, commands and past actions whatever else of it changes."""
     c = policy.contract
     return dataclasses.replace(
-        env,
-        control_rate=c.control_rate_hz,
-        command_range=c.action.command_range,
-        past_actions=c.past_actions,
+        env, control_rate=c.control_rate_hz, command_range=c.action.command_range, past_actions=c.past_actions
     )
 
 

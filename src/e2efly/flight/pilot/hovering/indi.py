@@ -68,14 +68,7 @@ class Indi:
         return FeltResponse()
 
     def step(
-        self,
-        memory: FeltResponse,
-        seen: Seen,
-        under_way: UnderWay,
-        place: Place,
-        dt: float,
-        *,
-        held: bool = False,
+        self, memory: FeltResponse, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
     ) -> tuple[FeltResponse, Ctbr]:
         """See `HoverController.step`."""
         vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)
