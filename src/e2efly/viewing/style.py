@@ -84,6 +84,12 @@ def figure(
         write_atomically(Path(path), picture.getvalue())
 
 
+def legend_of(ax: Axes, fig: Figure) -> None:
+    """Explain, below all plots of a figure, what one of them shows."""
+    handles, labels = ax.get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+
+
 def _label_decades(axis: Axis) -> None:
     """Label a logarithmic axis with plain numbers. Matplotlib's own labels are formulas, but every text of a figure is
     shown as it is, since it may hold the dollar signs of a name.
