@@ -24,7 +24,7 @@ from e2efly.config.drawing import INK, Face, Line, Mark, Thing
 from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.objects import scene
-from e2efly.viewing.style import FAILURE, GREY, MARK, PALE, SPEED, START, figure
+from e2efly.viewing.style import FAILURE, MARK, PALE, SPEED, START, figure, in_space
 from e2efly.viewing.worlds import draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
@@ -160,13 +160,7 @@ def draw_flights(ax: Solid, flights: Flights, things: list[Thing], low: Corner, 
     ax.set_proj_type("persp", focal_length=1.4)
     flat = _is_flat(high - low)
     ax.view_init(elev=34 if flat else 24, azim=-58)
-    for axis, label, few in ((ax.xaxis, "x (m)", 6), (ax.yaxis, "y (m)", 6), (ax.zaxis, "z (m)", 3 if flat else 6)):
-        axis.set_label_text(label)
-        axis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
-        axis.set_pane_color((1, 1, 1, 0))
-        axis.line.set_color(GREY)
-        axis.labelpad = 0
-    ax.tick_params(pad=1)
+    in_space(ax, (6, 6, 3 if flat else 6))
 
 
 def draw_flat(ax: Axes, things: list[Thing], axes: tuple[int, int]) -> None:
