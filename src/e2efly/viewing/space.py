@@ -111,14 +111,10 @@ def _is_flat(size: Corner) -> bool:
     return bool(size[2] < 0.4 * np.max(size[:2]))
 
 
-def _segments(points: np.ndarray) -> np.ndarray:
-    """(m, d) points as (m - 1, 2, d) pairs."""
-    return np.stack([points[:-1], points[1:]], axis=1)
-
-
 def _paths(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
     """The segments (s, 2, 3) of all flights up to their ends, and the speed on each segment."""
-    segments = [_segments(flights.position[:k, i]) for i, k in enumerate(flights.length)]
+    paths = [flights.position[:k, i] for i, k in enumerate(flights.length)]
+    segments = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
     speeds = [(flights.speed[: max(k - 1, 0), i] + flights.speed[1:k, i]) / 2 for i, k in enumerate(flights.length)]
     return np.concatenate([np.zeros((0, 2, 3)), *segments]), np.concatenate([np.zeros(0), *speeds])
 
