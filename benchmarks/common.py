@@ -58,11 +58,16 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     """Write figures with the machine and the day."""
     path = path or RESULTS / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, (laid_out(finite({"machine": machine(), "date": today(), **content})) + "\n").encode())
+    write_rows(path, {"machine": machine(), "date": today(), **content})
+
+
+def write_rows(path: Path, content: dict[str, Any]) -> None:
+    """Write JSON with a row of a table, and a list of numbers, in one line each."""
+    write_atomically(path, (laid_out(finite(content)) + "\n").encode())
 
 
 def laid_out(value: Any, margin: str = "") -> str:
-    """JSON with a row of a table, and a list of numbers, in one line each."""
+    """The text of `write_rows`."""
     inside = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
     if not any(isinstance(part, dict | list | tuple) for part in inside):
         return json.dumps(value, allow_nan=False)
