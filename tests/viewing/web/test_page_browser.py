@@ -193,7 +193,7 @@ def test_every_world_of_a_task_is_tested() -> None:
 
 STATED = (
     "avoid", "dodge", "hall", "hover_payload", "land_visual", "race_clutter", "race_speed", "avoid_together",
-    "race_duel", "swap",
+    "race_duel", "swap", "race_eyes",
 )  # fmt: skip
 """Tasks of cameras and of loads, whose worlds fly without them, too, of random worlds, and of several vehicles."""
 
