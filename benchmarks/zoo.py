@@ -56,7 +56,7 @@ from e2efly.runs import presets
 from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.stress import every_row
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, vehicle_names

@@ -153,6 +153,10 @@ class Goal:
         """(n, 3) position to be at now, world, m."""
         raise NotImplementedError
 
+    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
+        """(n, 3) the position to be at now minus that of the body, world, m: a field of many tasks."""
+        return self.goal(memory, time) - body.position
+
     def fence(self, memory: Any) -> Any:
         """Distance from the goal at which an episode ends, m, a number or (n,). Infinite: at none."""
         del memory
