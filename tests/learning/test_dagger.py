@@ -70,11 +70,19 @@ def turned(body: State) -> State:
         ),
         ("hover", {"teacher": "crazyflie/hover"}, "algo.teacher"),
         ("hover", {"teacher": "no/such"}, "no/such"),
+        ("hover", {"teacher": "expert"}, "algo.teacher is expert; accepted: for a task with an expert"),
     ],
 )
 def test_a_teacher_that_cannot_fly_here_is_refused(task: str, algo: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         setup(task, **algo).parameters()
+
+
+def test_an_expert_teaches_what_the_reward_imitates() -> None:
+    env = setup("swap", teacher="expert").env
+    state, _ = env.reset(random_key(5), 16)
+    action, _ = teacher_of("expert").act(env, state, jnp.zeros((16, 0)))
+    np.testing.assert_array_equal(action, env.expert_action(state))
 
 
 def test_by_default_the_teacher_is_the_zoos_policy_of_the_task() -> None:

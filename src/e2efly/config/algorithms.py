@@ -285,8 +285,8 @@ class DAggerConfig(_Annealed):
     horizon: int = number(32, above=0)
     """Steps of a window, over which the gradient of a GRU is propagated back (sets shapes)."""
     teacher: str = ""
-    """The policy that is imitated: a task of the zoo, a run, or a policy.onnx, without cameras. If it is empty, the
-    zoo's policy of the task (sets the program)."""
+    """The policy that is imitated: a task of the zoo, a run, or a policy.onnx, without cameras. expert: the expert of
+    the task, if it has one. If it is empty, the zoo's policy of the task (sets the program)."""
     led: float = number(0.15, high=1.0)
     """Share of the run in which the teacher flies, too: in all windows at its start, in none from then on."""
     learning_rate: float = number(2e-3, above=0, high=1.0)

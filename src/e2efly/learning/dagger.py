@@ -1,4 +1,4 @@
-"""Imitation of another policy that is told more (DAgger, Ross et al. 2011).
+"""Imitation of another policy that is told more, or of the task's expert (DAgger, Ross et al. 2011).
 
 The policy that learns flies, and at each state that it meets, the teacher says what it would do there. The error of the
 action is minimised over windows of steps, through the recurrent network but not through physics: what the teacher does
@@ -19,7 +19,7 @@ from e2efly.environment import Env, EnvState
 from e2efly.learning.algorithm import Algorithm, TrainState, adam_state, annealed, descend
 from e2efly.learning.networks import Weights
 from e2efly.learning.rollout import RolloutState, StepRecord, advance
-from e2efly.learning.teacher import Teacher, teacher_of
+from e2efly.learning.teacher import Expert, Teacher, teacher_of
 
 
 @jax.tree_util.register_dataclass
@@ -83,6 +83,6 @@ class DAgger(Algorithm):
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key, replay=remembered), metrics
 
 
-def teacher(env: Env, config: DAggerConfig) -> Teacher:
+def teacher(env: Env, config: DAggerConfig) -> Teacher | Expert:
     """The teacher that the options name: by default, the zoo's policy of the same task."""
     return teacher_of(config.teacher or env.task.config.name)

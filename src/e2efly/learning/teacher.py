@@ -1,4 +1,4 @@
-"""A policy that another one learns from: its network in JAX, and what it is shown."""
+"""What a policy learns from: another policy, or the expert of the task. Both know more than the one that learns."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -15,6 +15,10 @@ from e2efly.learning.warm_start import network_of, weights_of
 from e2efly.policy.contract import Contract
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
+from e2efly.tasks.task import Guided
+
+EXPERT = "expert"
+"""The name of the task's expert as a teacher."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +73,43 @@ class Teacher:
             )
 
 
+@dataclass(frozen=True)
+class Expert:
+    """The expert of a task (`e2efly.tasks.task.Guided`) as a teacher."""
+
+    def memory(self, n: int) -> Float[Array, "n 0"]:
+        """It remembers nothing."""
+        return jnp.zeros((n, 0))
+
+    def act(
+        self, env: Env, state: EnvState, memory: Float[Array, "n 0"]
+    ) -> tuple[Float[Array, "n c"], Float[Array, "n 0"]]:
+        """Its actions."""
+        return env.expert_action(state), memory
+
+    def check(self, env: Env) -> None:
+        """Refuse a task without an expert, and commands that it does not give.
+
+        Raises:
+            ValueError: naming the option, its value and what is accepted.
+        """
+        if not isinstance(env.task, Guided) or env.physics.command_mode != "ctbr":
+            raise ValueError(
+                f"algo.teacher is {EXPERT}; accepted: for a task with an expert and env.command_mode ctbr, or a policy"
+            )
+
+
 @cache
-def teacher_of(policy: str) -> Teacher:
-    """A teacher by its name: a task of the zoo, a run, or a policy.onnx.
+def teacher_of(name: str) -> Teacher | Expert:
+    """A teacher by its name: `expert`, a task of the zoo, a run, or a policy.onnx.
 
     Raises:
         ValueError: when there is no such policy, when it sees images, and when its network is not one of e2efly.
     """
+    return Expert() if name == EXPERT else _policy(name)
+
+
+def _policy(policy: str) -> Teacher:
     file = policy_file(policy)
     loaded = load_policy(file)
     if loaded.contract.images:

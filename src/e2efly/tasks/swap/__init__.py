@@ -5,7 +5,16 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from e2efly.config import BPTTConfig, NetworkConfig, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
+from e2efly.config import (
+    BPTTConfig,
+    DAggerConfig,
+    NetworkConfig,
+    PPOConfig,
+    RewardConfig,
+    TaskConfig,
+    TrainConfig,
+    number,
+)
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.tasks.registry import register
@@ -99,6 +108,11 @@ class SwapConfig(TaskConfig):
                 steps=20_000_000,
             )  # fmt: skip
         weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 10.0}
+        if algo == "dagger":
+            return TrainConfig(
+                cls.training(), DAggerConfig(teacher="expert"), RewardConfig(weights, {"avoid_reach": 0.8}),
+                network=NetworkConfig((192, 128)), steps=12_000_000, chunk=600, eval_episodes=800,
+            )  # fmt: skip
         return TrainConfig(
             cls.training(), BPTTConfig(envs=256, horizon=96, average=0.99),
             RewardConfig(weights, {"avoid_reach": 0.8}),
