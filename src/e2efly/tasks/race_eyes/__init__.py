@@ -77,8 +77,10 @@ class RaceEyesConfig(TaskConfig):
     """Half-width of each gate's random offset from its place on the track, m per axis."""
     gate_yaw: float = number(0.05, high=ANGLE)
     """Half-width of each gate's random rotation, rad."""
-    position: float = 0.5
+    position: float = 1.0
     """Radius of the ball around the track's start in which episodes start, m."""
+    heading: float = number(0.3, high=ANGLE)
+    """Largest start heading relative to the track's, rad, in either direction; drawn uniformly."""
     laps: int = 1
     """Number of laps that end the episode with success. 0: fly on until the time is over."""
     fence: float = number(defaults.RACE_FENCE, above=0, endless=True)

@@ -14,6 +14,7 @@ from e2efly.simulation.physics import State
 from e2efly.tasks.race.any_goal import AnyRaceMemory
 from e2efly.tasks.race.any_world import AnyRace, begun, displaced, several
 from e2efly.tasks.race_eyes import RaceEyesConfig
+from e2efly.tasks.task import uniform
 
 
 @partial(jax.tree_util.register_dataclass, data_fields=["config", "shape", "given"], meta_fields=[])
@@ -42,9 +43,10 @@ class RaceEyes(AnyRace):
         return RaceEyes(dataclasses.replace(config, track=("",) * len(config.track)), shape, given)
 
     def start(self, key: PRNGKeyArray, n: int) -> tuple[State, AnyRaceMemory]:
-        """At rest and level in a ball around the start of a track, with the heading of the track."""
-        track_key, state_key = jax.random.split(key)
+        """At rest and level in a ball around the start of a track, roughly with the heading of the track."""
+        track_key, state_key, heading_key = jax.random.split(key, 3)
         c = self.config
         tracks = displaced(track_key, n, self.given, c.gate_position, c.gate_yaw, c.only)
-        state = begun(state_key, n, c.position, self.shape, tracks.gates.start, tracks.gates.start_yaw)
+        heading = tracks.gates.start_yaw + c.heading * uniform(heading_key, n, 1)[:, 0]
+        state = begun(state_key, n, c.position, self.shape, tracks.gates.start, heading)
         return state, AnyRaceMemory(tracks, jnp.zeros(n, jnp.int32), jnp.full(n, jnp.inf))
