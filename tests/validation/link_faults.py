@@ -29,6 +29,8 @@ class Fault:
     """Whether the vehicle still flies at the end."""
     falls: bool = False
     """Whether the motors stop in the air, as documented: nothing is asked of the touch."""
+    watched: bool = True
+    """Whether the bridge has its watchdog, where there is one for the autopilot."""
     heals_after: float | None = None
     """The fault ends after this time, s. None: it lasts."""
     heal: Callable[[FlownPeer, Session], None] = lambda rig, session: None
@@ -103,6 +105,7 @@ class FaultEnd:
 
 def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
     """Fly into a fault out of a hover, and judge the end."""
+    rig.plan(session.bridge)
     before = len(rig.log)
     fault.begin(rig, session)
     begun, fastest, alive = rig.now(), 0.0, fault.bridge_lives
@@ -114,6 +117,7 @@ def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
         sinks = -float(rig.state.velocity[2])
         if alive:
             session.step()
+            rig.plan(session.bridge)
         else:
             rig.sleep(session.period)
         now_high = float(rig.state.position[2]) > rig.world.vehicle.feet_height + 0.01
