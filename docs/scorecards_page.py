@@ -14,7 +14,16 @@ from e2efly.validation.stress_laws import LAWS
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results" / "scorecards.json"
 TASKS = ("hover", "land", "track", "race")
-"""The order of the tasks in the table."""
+"""The order of the tasks in a table."""
+VEHICLES = {
+    "vis_r": ("VIS-R", ""),
+    "crazyflie": (
+        "Crazyflie",
+        "Policies for any quadrotor: RAPTOR's published checkpoint, ours by rotors, and ours by thrust and body rates "
+        "([all three on a thousand vehicles](any-vehicle.md#beside-raptor)).",
+    ),
+}
+"""The tables in their order, by the vehicle that flies: its name, and what is compared."""
 HEAD = f"""# Score a policy
 
     e2efly benchmark hover                            # a policy of the zoo
@@ -111,13 +120,19 @@ the latency of that contract, also where another one is flown. Success does not 
 def page() -> str:
     """The page."""
     found: dict[str, Any] = json.loads(RESULTS.read_text(encoding="utf-8"))
-    machine = found["machine"]
-    about = (
-        f"VIS-R, {found['episodes']} starts a row and {found['flights']} on MuJoCo, by `benchmarks/scorecards.py`, "
-        f"{found['date']}, {machine['cores']} cores of {machine['cpu']}, e2efly {machine['e2efly']}."
-    )
-    rows = sorted(found["table"], key=lambda row: (TASKS.index(row["task"]), row["policy"] != row["task"]))
-    return "\n".join([HEAD + EXAMPLE + FIELDS, about, "", *markdown(rows), AFTER])
+    lines = [
+        HEAD + EXAMPLE + FIELDS.rstrip(),
+        f"{found['episodes']} starts a row and {found['flights']} on MuJoCo, by `benchmarks/scorecards.py`, e2efly "
+        f"{found['machine']['e2efly']}.",
+    ]
+    for vehicle, (name, about) in VEHICLES.items():
+        rows = [row for row in found["table"] if row["vehicle"] == vehicle]
+        rows.sort(key=lambda row: (TASKS.index(row["task"]), row["policy"] != row["task"]))
+        measured = sorted({f"{card['date']}, {card['cpu']}" for card in found["cards"] if card["vehicle"] == vehicle})
+        columns = {column: "-" for row in rows for column in row}
+        lines += ["", f"### {name}", "", *([about, ""] if about else []), *markdown([columns | row for row in rows])]
+        lines += ["", f"Measured {'; '.join(measured)}."]
+    return "\n".join([*lines, AFTER])
 
 
 if __name__ == "__main__":
