@@ -40,12 +40,16 @@ class LinkBench:
     """Of the hover in which faults strike, m."""
     seed: int
 
+    @property
+    def names(self) -> list[str]:
+        """Of flights and faults, in the order of the tables."""
+        return [*self.policies, *(fault.name for fault in self.faults)]
+
     def options(self, about: str, *, flights: int, faults: int, **more: Any) -> argparse.Namespace:
         """The command line: how often each is flown, which of them, and from which seed on."""
-        every = [*self.policies, *(fault.name for fault in self.faults)]
-        asked = arguments(about, only=every, flights=flights, faults=faults, seed=self.seed, **more)
-        if unknown := set(asked.only) - set(every):
-            raise SystemExit(f"--only is {unknown}; accepted: {every}")
+        asked = arguments(about, only=self.names, flights=flights, faults=faults, seed=self.seed, **more)
+        if unknown := set(asked.only) - set(self.names):
+            raise SystemExit(f"--only is {unknown}; accepted: {self.names}")
         return asked
 
     def measure(self, asked: argparse.Namespace, autopilots: Mapping[str, Opens], **about: Any) -> None:
@@ -58,7 +62,8 @@ class LinkBench:
             other = "faults" if part == "table" else "table"
             for row in rows:
                 print(table([row]), flush=True)
-                found = {part: with_earlier(self.name, asked.json, part, (key,), [row])}
+                every = {one[key]: one for one in with_earlier(self.name, asked.json, part, (key,), [row])}
+                found = {part: [every[name] for name in self.names if name in every]}
                 found[other] = with_earlier(self.name, asked.json, other, (), [])
                 write(self.name, asked.json, {**about, **found})
 
