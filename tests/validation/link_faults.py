@@ -108,6 +108,7 @@ def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
     rig.plan(session.bridge)
     before = len(rig.log)
     fault.begin(rig, session)
+    place = np.array(rig.state.position[:2])
     begun, fastest, alive = rig.now(), 0.0, fault.bridge_lives
     healed, high = fault.heals_after is None, True
     while rig.now() < begun + fault.seconds:
@@ -126,7 +127,10 @@ def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
     acted = any(line.startswith("failsafe") for line in rig.log[before:])
     down = not high
     mode, tilt = session.bridge.flight.mode, 1 - 2 * float(np.sum(np.square(rig.state.quaternion[1:3])))
-    told = f"{mode}, {'down' if down else 'flies'}, touch {fastest:.2f} m/s, {'; '.join(rig.log[before:])}"
+    aside = float(np.linalg.norm(rig.state.position[:2] - place))
+    told = f"{mode}, {'down' if down else 'flies'}, touch {fastest:.2f} m/s, {aside:.2f} m aside, " + "; ".join(
+        rig.log[before:]
+    )
     good = (
         acted is fault.autopilot_acts
         and down is not fault.flies
