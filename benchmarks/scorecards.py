@@ -26,6 +26,7 @@ KEYS = ("policy", "task", "vehicle")
 
 def card_of(policy: str, flown: str, vehicle: str, out: Path, episodes: int, flights: int) -> dict[str, Any]:
     """The card of a policy, or of a controller in its place."""
+    out.mkdir(parents=True, exist_ok=True)
     folder = out / f"{policy.replace('/', '-')}-{flown}-{vehicle}"
     controller = None if flown == "policy" else flown
     file = str(raptor(out)) if policy == "raptor" else policy
