@@ -41,7 +41,8 @@ from e2efly.learning.setup import Setup  # noqa: E402
 from e2efly.learning.warm_start import started_from  # noqa: E402
 from e2efly.policy.zoo import policy_file  # noqa: E402
 from e2efly.runs import presets  # noqa: E402
-from e2efly.validation.evaluation import act_of, candidate, evaluate  # noqa: E402
+from e2efly.validation.candidate import candidate  # noqa: E402
+from e2efly.validation.evaluation import act_of, evaluate  # noqa: E402
 
 STARTS = 100
 """Of a track, where times are compared."""

@@ -20,7 +20,8 @@ import e2efly
 from e2efly.environment import UNSEEN, random_key
 from e2efly.environment.episodes import run_stepwise
 from e2efly.policy.zoo import FOLDER
-from e2efly.validation.evaluation import act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import act_of
 from e2efly.vehicles.loading import load_vehicle, vehicle_file, vehicle_names
 
 DELAYS = (0.0, 0.03, 0.06, 0.09, 0.12)

@@ -17,7 +17,7 @@ from typing import Any
 from e2efly.commands.terminal import markdown
 from e2efly.commands.train import recorded
 from e2efly.config import EnvConfig
-from e2efly.config.storage import write_json
+from e2efly.config.storage import finite, write_atomically
 from e2efly.runs.inputs import fingerprint
 from e2efly.simulation.device import processor
 
@@ -58,7 +58,23 @@ def write(name: str, path: Path | None, content: dict[str, Any]) -> None:
     """Write figures with the machine and the day."""
     path = path or RESULTS / f"{name}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(path, {"machine": machine(), "date": today(), **content})
+    write_rows(path, {"machine": machine(), "date": today(), **content})
+
+
+def write_rows(path: Path, content: dict[str, Any]) -> None:
+    """Write JSON with a row of a table, and a list of numbers, in one line each."""
+    write_atomically(path, (laid_out(finite(content)) + "\n").encode())
+
+
+def laid_out(value: Any, margin: str = "") -> str:
+    """The text of `write_rows`."""
+    inside = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    if not any(isinstance(part, dict | list | tuple) for part in inside):
+        return json.dumps(value, allow_nan=False)
+    names = [f"{json.dumps(name)}: " for name in value] if isinstance(value, dict) else [""] * len(value)
+    lines = [f"{margin} {name}{laid_out(part, margin + ' ')}" for name, part in zip(names, inside, strict=True)]
+    first, last = "{}" if isinstance(value, dict) else "[]"
+    return "\n".join([first, ",\n".join(lines), margin + last])
 
 
 @cache

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from common import arguments, table, write
 
+from e2efly.validation.candidate import candidate
 from e2efly.validation.duels import Duels, duel
-from e2efly.validation.evaluation import candidate
 
 DRAWS = 500
 """Number of draws for an interval."""

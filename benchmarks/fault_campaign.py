@@ -24,13 +24,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from common import RESULTS, table, today, write
+from common import RESULTS, table, today, write, write_rows
 from tests.faults import blocks
 from tests.faults.campaign import Scenario, fly
 from tests.faults.scenarios import CASES, drawn
 
 import e2efly
-from e2efly.config.storage import read_json, write_json
+from e2efly.config.storage import read_json
 from e2efly.policy.loader import load_policy
 from e2efly.simulation.device import cores
 from e2efly.validation import firmware_program
@@ -149,7 +149,7 @@ def main() -> None:
     if options.publish:
         used, block = blocks.next_of(used, package, today())
         seeds = block.seeds
-        write_json(RESULTS / "fault_campaign.json", results | blocks.told(used))  # from the first flight on it is known
+        write_rows(RESULTS / "fault_campaign.json", results | blocks.told(used))  # from the first flight on it is known
     elif problem := blocks.problem_of(seeds, used):
         parser.error(problem)
     if options.only:

@@ -26,7 +26,7 @@ from e2efly.config.storage import finite
 from e2efly.flight.settings import Fence
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import route_of
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.rehearsal import Rehearsal
 from e2efly.vehicles.loading import load_vehicle
 

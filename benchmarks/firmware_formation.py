@@ -23,7 +23,7 @@ from e2efly.tasks.swap.goal import SwapRoute
 from e2efly.tasks.swap.world import Swap
 from e2efly.tasks.task import Shape
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.formation import FormationFlight, fly_formation
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle

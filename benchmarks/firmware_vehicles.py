@@ -21,7 +21,7 @@ from e2efly.commands.rehearsals import fly_whole
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.policy.zoo import contents
 from e2efly.simulation.device import compute_at_once, prepare
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.plant_validation import validate
 from e2efly.validation.rehearsal import Rehearsal
 from e2efly.vehicles.loading import load_vehicle

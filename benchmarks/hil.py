@@ -86,7 +86,7 @@ def largest_rate(size: int, images: int, scene: str | None = None) -> tuple[floa
     compute_at_once()
     prepare("cpu")
     from e2efly.courses.origin import Origin
-    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.candidate import candidate
     from e2efly.validation.plant import RigidState
     from e2efly.validation.scene_files import SceneFile
     from e2efly.validation.scenery import Scenery

@@ -23,7 +23,7 @@ from firmware_flights import FENCE, IN_ROOM
 
 from e2efly.simulation.device import prepare
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.hil_lap import Lap, Spread
 from e2efly.validation.processes import Victim, flags
 from e2efly.validation.rehearse_hil import RehearsalPlan, rehearse

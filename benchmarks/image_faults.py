@@ -11,7 +11,7 @@ from tests.faults.image_faults import FAULTS, UPSIDE_DOWN, fly_with
 
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.vehicles.loading import load_vehicle
 
 

@@ -25,7 +25,8 @@ from e2efly.environment import UNSEEN, Env, EnvState, random_key
 from e2efly.environment.episodes import Episodes, run_stepwise
 from e2efly.policy.runtime import Runtime
 from e2efly.simulation.device import prepare
-from e2efly.validation.evaluation import Candidate, act_of, candidate
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import act_of
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import flying, together
 from e2efly.validation.plants import find_plant
@@ -88,7 +89,8 @@ def frame_row(vehicle: Vehicle, flown: Episodes, i: int) -> dict[str, Any]:
 
 def frames_of(batches: list[dict[str, Any]], law: str) -> list[dict[str, Any]]:
     """The feasible frames of a law."""
-    return [frame for one in batches if one["frames"] == law for frame in one["feasible"]]
+    columns = [one["feasible"] for one in batches if one["frames"] == law]
+    return [dict(zip(some, frame, strict=True)) for some in columns for frame in zip(*some.values(), strict=True)]
 
 
 def feasible_share(batches: list[dict[str, Any]], law: str) -> str:
@@ -148,7 +150,8 @@ def main() -> None:
             flown, _, vehicles = fly(found, judged, options.seed, batch)
             good = [i for i, vehicle in enumerate(vehicles) if feasible(vehicle)]
             frames = [frame_row(vehicles[i], flown, i) for i in good]
-            batches.append({"frames": law, "drawn": BATCH, "feasible": frames})
+            columns = {name: [frame[name] for frame in frames] for name in frames[0]}
+            batches.append({"frames": law, "drawn": BATCH, "feasible": columns})
             keep()
     if len(mujoco) < options.mujoco:
         judged = dataclasses.replace(env, family=dataclasses.replace(env.family, straightened=False))

@@ -28,9 +28,9 @@ from claims.experiment import Experiment, Run
 from claims.found import Found
 from claims.rule import judge
 from claims.running import HELD, LEVELS, How, key, make, wanted
-from common import RESULTS, machine, table, today
+from common import RESULTS, machine, table, today, write_rows
 
-from e2efly.config.storage import held, write_json
+from e2efly.config.storage import held
 
 FILE = RESULTS / "paper.json"
 
@@ -88,7 +88,7 @@ def write(path: Path, known: dict[str, Any]) -> None:
     """Judge all experiments anew, and write them."""
     path.parent.mkdir(parents=True, exist_ok=True)
     parts = {name: {**known[name], **judged(of, known[name]["runs"])} for name, of in EXPERIMENTS.items()}
-    write_json(path, parts)
+    write_rows(path, parts)
 
 
 def asked(experiment: Experiment, options: argparse.Namespace) -> list[tuple[Run, int]]:

@@ -30,7 +30,8 @@ from e2efly.policy.zoo import config_file, contents
 from e2efly.runs.inputs import from_json
 from e2efly.simulation.device import prepare
 from e2efly.tasks.race_speed.goal import QUICKEST
-from e2efly.validation.evaluation import Candidate, act_of, candidate
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import act_of
 
 BATCH = 250
 """Starts that are flown at once."""

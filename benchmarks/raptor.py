@@ -36,7 +36,8 @@ from e2efly.simulation.device import prepare
 from e2efly.simulation.physics.body import hover_rotor_speed
 from e2efly.simulation.physics.rotation import from_euler, multiply, yaw
 from e2efly.tasks.hover import HoverConfig
-from e2efly.validation.evaluation import act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import act_of
 from e2efly.vehicles.family import DRAWN, load_family
 from e2efly.vehicles.gravity import GRAVITY
 

@@ -60,7 +60,8 @@ def frames(task: str, count: int, seconds: float, looks: bool) -> float:
     from e2efly.simulation.device import prepare
 
     prepare("cpu")
-    from e2efly.validation.evaluation import act_of, candidate
+    from e2efly.validation.candidate import candidate
+    from e2efly.validation.evaluation import act_of
     from e2efly.viewing.watch.loop import run
     from e2efly.viewing.watch.panels import Panel, hands_on
     from e2efly.viewing.watch.simulation import Simulation

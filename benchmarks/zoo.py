@@ -56,7 +56,7 @@ from e2efly.runs import presets
 from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
 from e2efly.tasks import TASKS
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.stress import every_row
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
@@ -65,7 +65,7 @@ VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors
 """Policies of a task by a preset of its own: task and preset."""
 ALONE = {
     "race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_payload": USUAL,
-    "race_duel": USUAL, "hover_rotors": presets.FAMILY,
+    "race_duel": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
 }  # fmt: skip
 """For this vehicle alone."""
 FRAMES = "multirotor"

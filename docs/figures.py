@@ -401,10 +401,10 @@ def any_track() -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    from e2efly.courses.random_tracks import CANDIDATES, NUMBERS, random_tracks
+    from e2efly.courses.random_tracks import RACING, random_tracks
     from e2efly.viewing.style import GREY, PALE, SPEED, START, figure
 
-    tracks = random_tracks(np.random.default_rng(7).random((15, CANDIDATES, NUMBERS), np.float32))
+    tracks = random_tracks(np.random.default_rng(7).random((15, *RACING.numbers()), np.float32))
     notes = [
         "from above; gates as wide as their openings, coloured by height; arrows: flown through that way",
         "numbers: order of the gates; circle: start; grey: straight from gate to gate",

@@ -43,8 +43,8 @@ measured: on a CPU the preset `nominal` of hover, land, track and race reaches i
 environments take away: `race --task.track any` and `avoid` took a quarter of the updates on a GPU. No preset needs
 more than 2 GB of the card's memory, by the estimate that `train` makes before it begins. Presets that state the
 conditions of a published result (`paper`, `authors`) are the same on every device, and so are the sizes of `shac`,
-`abpt` and `foppo`, which nobody has measured on a GPU. `ablate` trains its members side by side, which fills a GPU,
-with the sizes for a CPU.
+`abpt`, `foppo` and `dagger`, which nobody has measured on a GPU. `ablate` trains its members side by side, which fills
+a GPU, with the sizes for a CPU.
 
 What you say goes before the preset: `--algo.envs 512` is 512 on every device. A run keeps its sizes in `config.json`.
 `--resume DIR` goes on with them on any device, and `--config FILE` takes those of the file. `sweep --gpus 1` trains

@@ -25,7 +25,8 @@ from e2efly.environment import UNSEEN, random_key
 from e2efly.simulation.device import prepare
 from e2efly.simulation.physics.rotation import to_matrix
 from e2efly.simulation.scenes.faces import FacesBody, bodies
-from e2efly.validation.evaluation import SEED, act_of, candidate, drawn_by
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED, act_of, drawn_by
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.image_plots import show
 from e2efly.viewing.objects import scene

@@ -21,7 +21,8 @@ from e2efly.config import TaskConfig
 from e2efly.environment import UNSEEN, Env, random_key
 from e2efly.policy.zoo import USUAL, contents, curve_file, policy_file
 from e2efly.simulation.device import prepare
-from e2efly.validation.evaluation import SEED, act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED, act_of
 from e2efly.viewing.flights import Flights, fly
 from e2efly.viewing.space import plot_flights
 from e2efly.viewing.style import CYCLE, figure

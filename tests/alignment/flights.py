@@ -13,6 +13,7 @@ from e2efly.vehicles.vehicle import Vehicle
 
 FILE = load_vehicle("vis_r")
 USUAL = Sensors()
+PERFECT = Sensors(*[0.0] * 9, gaps=0)
 
 
 def flown(body: Vehicle, seconds: float, sensors: Sensors = USUAL, seed: int = 0, **excitation: Any) -> Record:

@@ -16,9 +16,9 @@ from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.readers import read_flights
 from e2efly.logs.recording import Record, Stream
-from e2efly.validation.plant_excitation import PERFECT, Sensors
+from e2efly.validation.plant_excitation import Sensors
 from e2efly.vehicles.loading import load_vehicle, read_sigmas
-from tests.alignment.flights import FILE, as_mcap, flown
+from tests.alignment.flights import FILE, PERFECT, as_mcap, flown
 
 BODY = dataclasses.replace(FILE, rate_gain=FILE.rate_gain * [1.3, 0.75, 1.2], latency=0.035)
 POSES = 0.02

@@ -13,9 +13,9 @@ import pytest
 from e2efly.alignment import parts
 from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
-from e2efly.validation.plant_excitation import PERFECT, Sensors
+from e2efly.validation.plant_excitation import Sensors
 from e2efly.vehicles.loading import load_vehicle
-from tests.alignment.flights import FILE, as_mcap, flown
+from tests.alignment.flights import FILE, PERFECT, as_mcap, flown
 from tests.alignment.test_stand import write
 from tests.logs.flight_formats import MOTIONS, as_blackbox, as_ulog, with_outputs
 

@@ -13,11 +13,11 @@ from e2efly.alignment.identification import identify
 from e2efly.alignment.vehicle_file import merged
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.recording import Record
-from e2efly.validation.plant_excitation import PERFECT, Sensors, fly_excitation, sensed
+from e2efly.validation.plant_excitation import Sensors, fly_excitation, sensed
 from e2efly.validation.plants import find_plant
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import Vehicle
-from tests.alignment.flights import FILE, flown
+from tests.alignment.flights import FILE, PERFECT, flown
 
 BODY = dataclasses.replace(
     FILE,

@@ -12,10 +12,9 @@ from e2efly.alignment.open_loop import AHEAD, HOLD, HOVER, OWN_S, OWN_VEHICLE, V
 from e2efly.commands.cli import run
 from e2efly.logs.csv_file import write_csv
 from e2efly.logs.recording import Record, Stream
-from e2efly.validation.plant_excitation import PERFECT
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
-from tests.alignment.flights import FILE, flown
+from tests.alignment.flights import FILE, PERFECT, flown
 
 HEAVY = dataclasses.replace(FILE, mass=1.15 * FILE.mass)
 SAG = 0.1

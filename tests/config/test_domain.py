@@ -29,7 +29,7 @@ from e2efly.tasks.race_clutter.world import RaceClutter
 from e2efly.tasks.route import ANYWAY, UNDECLARED, course_for, goal_notes, route_of
 from e2efly.tasks.track import TrackConfig
 from e2efly.tasks.track.splines import polynomial
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.vehicles.loading import load_vehicle
 
 VEHICLE = load_vehicle("vis_r")

@@ -12,7 +12,7 @@ from e2efly.policy.loader import Policy
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
 from e2efly.validation.bridge_session import rehearsal_settings
-from e2efly.validation.evaluation import Candidate, candidate
+from e2efly.validation.candidate import Candidate, candidate
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course
 from e2efly.validation.rig import Rig

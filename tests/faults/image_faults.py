@@ -20,7 +20,7 @@ from e2efly.flight.sight.captured import Captured
 from e2efly.flight.sight.image_source import Frame, ImageSource
 from e2efly.policy.images import Image
 from e2efly.validation.bridge_session import Session, rehearsal_settings
-from e2efly.validation.evaluation import Candidate
+from e2efly.validation.candidate import Candidate
 from e2efly.validation.firmware_program import Firmware
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearsal import REACH_IN_SIGHT, whole_course

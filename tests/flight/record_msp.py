@@ -22,7 +22,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from e2efly.flight.betaflight.client import MESSAGES, Client, ask, tell
+from e2efly.flight.betaflight.client import MESSAGES, Client, ask
 from e2efly.flight.betaflight.codec import Decoder, MspFrame, encode
 from e2efly.flight.betaflight.messages import Rc, set_raw_rc
 from e2efly.flight.link import open_link
@@ -178,8 +178,8 @@ def record(binary: str) -> dict[str, Any]:
             curves = []
             for i, tuning in enumerate(TUNINGS):
                 deadband = DEADBANDS.get(i, (0, 0))
-                tell(client, MspFrame(SET_RC_DEADBAND, struct.pack("<BBBH", *deadband, 0, 50)), 10.0)
-                tell(client, MspFrame(SET_RC_TUNING, tuning_payload(tuning)), 10.0)
+                ask(client, SET_RC_DEADBAND, 10.0, struct.pack("<BBBH", *deadband, 0, 50))
+                ask(client, SET_RC_TUNING, 10.0, tuning_payload(tuning))
                 rows = []
                 for offset in STICKS:
                     throttle = 1500 + offset

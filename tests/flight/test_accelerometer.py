@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from e2efly.flight.attitude import Attitude
-from e2efly.flight.pilot.accelerometer import RANGE, Scale, learn, level, standing_problem
+from e2efly.flight.attitude import Attitude, level
+from e2efly.flight.pilot.accelerometer import RANGE, Scale, learn, standing_problem
 from e2efly.vehicles.gravity import GRAVITY
 
 DT = 0.02

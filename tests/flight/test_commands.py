@@ -22,6 +22,7 @@ from e2efly.flight.commander.stream import STEADY_S, CommandStream, take
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.runtime import MODES, Envelope
+from e2efly.policy.worker import Sensed
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.loading import load_vehicle
 from tests.flight.command_streams import Loopback, encode
@@ -227,16 +228,16 @@ def test_silence_ends_it_after_the_time_out_and_a_command_stands_until_then() ->
     source = Said()
     commander = Commander(source, VEHICLE, SETTINGS)
     now = heard(commander, source, 100.0, 101.0, said("ctbr")) - 0.01
-    assert not commander.step(STILL, now, 0.0, None)  # it has not taken over
+    assert not commander.step(Sensed(STILL), now, 0.0)  # it has not taken over
     assert commander.decision is None
     commander.start(STILL, now)
-    assert commander.step(STILL, now, 0.0, None)
+    assert commander.step(Sensed(STILL), now, 0.0)
     commander.hear(STILL, now + 0.19)
-    assert not commander.step(STILL, now + 0.19, 0.0, None)
+    assert not commander.step(Sensed(STILL), now + 0.19, 0.0)
     assert commander.problem is None
     np.testing.assert_allclose(commander.decision.command, [12, 1, 2, -3])
     commander.hear(STILL, now + 0.21)
-    commander.step(STILL, now + 0.21, 0.0, None)
+    commander.step(Sensed(STILL), now + 0.21, 0.0)
     assert commander.problem == "no good command for 0.21 s; accepted: 0.2"
 
 
@@ -251,7 +252,7 @@ def test_each_mode_enters_the_cascade_at_its_own_level(mode: str) -> None:
     source.waiting.append(encode(mode=mode, **content))
     commander.hear(STILL, 100.0)
     commander.start(STILL, 100.0)
-    commander.step(STILL, 100.0, 0.0, None)
+    commander.step(Sensed(STILL), 100.0, 0.0)
     assert commander.decision.mode == "ctbr"
     np.testing.assert_allclose(commander.decision.command, [GRAVITY, 0, 0, 0], atol=1e-6)
 

@@ -134,8 +134,8 @@ def test_old_motion_is_forgotten() -> None:
 
 def test_a_delay_is_refused_in_words_only_where_it_is_surely_too_long() -> None:
     assert delay_problem(None, 0.05) is None
-    assert delay_problem(MeasuredDelay(0.06, 0.01, 0.9), 0.05) is None
-    assert delay_problem(MeasuredDelay(0.15, 0.002, 0.99), 0.05) == (
+    assert delay_problem(MeasuredDelay(0.06, 0.01), 0.05) is None
+    assert delay_problem(MeasuredDelay(0.15, 0.002), 0.05) == (
         "poses are 0.150 s late by the controller's gyro (within 0.004 s); accepted: 0.050 s; tell the source's delay "
         "by --latency, or mend it"
     )

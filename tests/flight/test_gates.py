@@ -299,6 +299,8 @@ def test_a_vehicle_that_is_carried_does_not_learn_that_it_stands() -> None:
     [
         ('track = "four_gates"', "accepted: track"),
         (EYE.replace("fov = [90.0, 58.7]", "fov = [190.0, 58.7]"), "camera.fov is [190.0, 58.7]; accepted"),
+        (EYE.replace("width = 640", "width = 640.5"), "camera.width is 640.5; accepted: a whole number of pixels"),
+        (EYE.replace("height = 360", "height = 31"), "camera.height is 31; accepted: 32 to 4096"),
         (EYE.replace("rate = 30.0", "rate = 0"), "camera.rate is 0; accepted: 1 to 500"),
         (EYE.replace("rate = 30.0", "rate = 30.0\nlens = 2"), "camera is"),
         (EYE.replace("four_gates", "moon"), "moon"),

@@ -274,7 +274,7 @@ def test_the_report_says_how_late_velocities_and_poses_are_beside_the_training(
     assert "states 0 to 20 ms old, and 50 ms from observation to command" in alone[""]
     watched = StateEstimate(
         Checks(), 0.1, given=(True, True), lag=(MeasuredLag(0.06, 0.002), None),
-        delay=MeasuredDelay(0.1, 0.012, 0.9), pace=Pace(9.0, 9.0, 9.0, present=Half(0.0, 900, 0.1, (0.08, 0.06))),
+        delay=MeasuredDelay(0.1, 0.012), pace=Pace(9.0, 9.0, 9.0, present=Half(0.0, 900, 0.1, (0.08, 0.06))),
     )  # fmt: skip
     rows = reported(watched, trained, capsys)
     assert rows["velocity lag"] == "no: 60 ms (within 4 ms) later than the poses; the policy is for up to 25 ms"

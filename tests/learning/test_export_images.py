@@ -21,7 +21,8 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.random_inputs import random_images, random_observations
 from e2efly.runs import presets
 from e2efly.runs.rundir import RunDirectory, run_of
-from e2efly.validation.evaluation import act_of, check_observation, config_from_contract
+from e2efly.validation.candidate import check_observation, config_from_contract
+from e2efly.validation.evaluation import act_of
 from e2efly.vehicles.loading import load_vehicle
 from tests.learning.parity import parity
 

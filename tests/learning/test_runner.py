@@ -282,7 +282,7 @@ def test_a_run_of_a_version_that_did_not_know_an_option_is_read_without_it() -> 
 
 NOT_IN_THE_PAPER = (
     "hover_aware", "gap", "race_speed", "race_clutter_room", "dodge", "hall", "swap", "avoid_together", "race_duel",
-    "hover_payload",
+    "hover_payload", "race_eyes",
 )  # fmt: skip
 BY_THE_PAPER = ("ppo", "bptt", "abpt")
 

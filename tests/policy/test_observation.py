@@ -18,7 +18,7 @@ from e2efly.policy.runtime import Imu, Runtime, act, begin
 from e2efly.runs import presets
 from e2efly.tasks.hover.goal import HoverRoute
 from e2efly.tasks.route import course_for
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.vehicles.loading import load_vehicle
 from tests.policy.made import made
 

@@ -20,7 +20,7 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.onnx_file import sealed
 from e2efly.policy.runtime import Runtime
-from e2efly.policy.worker import PolicyWorker
+from e2efly.policy.worker import PolicyWorker, Sensed
 from e2efly.tasks.route import course_for
 from e2efly.vehicles.loading import load_vehicle
 from tests.policy.made import made
@@ -79,7 +79,7 @@ def test_it_decides_when_due_on_a_grid_without_drift(workers: Workers) -> None:
     random = np.random.default_rng(0)
     for k in range(300):  # a loop of 100 Hz that is late by up to 4 ms
         now = START + 0.01 * k + random.uniform(0, 0.004)
-        if worker.step(STILL, now, 0.005, None):
+        if worker.step(Sensed(STILL), now, 0.005):
             decided.append(now - START)
     assert worker.problem is None and worker.state is not None
     assert len(decided) == math.ceil(3.0 / period)
@@ -91,12 +91,12 @@ def test_it_decides_when_due_on_a_grid_without_drift(workers: Workers) -> None:
 def test_between_two_questions_the_last_decision_stands(workers: Workers) -> None:
     worker = workers()
     assert worker.decision is None
-    assert worker.step(STILL, START, 0.0, None)
+    assert worker.step(Sensed(STILL), START, 0.0)
     first = worker.decision
     assert first is not None and np.isfinite(first.command).all()
-    assert not worker.step(STILL, START + 0.5 * worker.runtime.period, 0.0, None)
+    assert not worker.step(Sensed(STILL), START + 0.5 * worker.runtime.period, 0.0)
     assert worker.decision is first
-    assert worker.step(STILL, START + worker.runtime.period, 0.0, None)
+    assert worker.step(Sensed(STILL), START + worker.runtime.period, 0.0)
     assert worker.decision is not first
 
 
@@ -120,17 +120,17 @@ def test_a_policy_of_nan_is_a_problem_and_decides_nothing(policy_file: Path, tmp
     course = worker.runtime.course
     at_goal = np.asarray(course.goal.goal(course.memory, np.zeros(1)))[0]
     worker.start(dataclasses.replace(STILL, position=at_goal), START)
-    assert worker.step(dataclasses.replace(STILL, position=at_goal), START, 0.0, None), worker.problem
+    assert worker.step(Sensed(dataclasses.replace(STILL, position=at_goal)), START, 0.0), worker.problem
     decision = worker.decision
     away = dataclasses.replace(STILL, position=at_goal - 3.0)
-    assert not worker.step(away, START + worker.runtime.period, 0.0, None)
+    assert not worker.step(Sensed(away), START + worker.runtime.period, 0.0)
     assert worker.problem is not None and "nan" in worker.problem
     assert worker.decision is decision
 
 
 def test_an_odometry_of_nan_is_a_problem(workers: Workers) -> None:
     worker = workers()
-    assert not worker.step(dataclasses.replace(STILL, velocity=np.array([0, math.nan, 0])), START, 0.0, None)
+    assert not worker.step(Sensed(dataclasses.replace(STILL, velocity=np.array([0, math.nan, 0]))), START, 0.0)
     assert worker.problem is not None and "velocity" in worker.problem
     assert worker.readiness(dataclasses.replace(STILL, position=np.full(3, math.nan)), START)
 
@@ -146,16 +146,16 @@ def test_whatever_a_policy_raises_is_a_problem(
 
     worker = workers()
     misbehave(monkeypatch, act)
-    assert not worker.step(STILL, START, 0.0, None)
+    assert not worker.step(Sensed(STILL), START, 0.0)
     assert worker.problem == (str(error) or type(error).__name__)
     # the flight is over for it; the next one begins afresh
     worker.stop()
     assert worker.state is None and worker.decision is None and not worker.done
-    assert not worker.step(STILL, START + 1.0, 0.0, None)
+    assert not worker.step(Sensed(STILL), START + 1.0, 0.0)
     misbehave(monkeypatch, runtime.act)
     assert worker.readiness(STILL, START + 2.0) is None
     worker.start(STILL, START + 2.0)
-    assert worker.problem is None and worker.step(STILL, START + 2.0, 0.0, None)
+    assert worker.problem is None and worker.step(Sensed(STILL), START + 2.0, 0.0)
 
 
 def test_a_slow_policy_is_late_then_busy_and_never_holds_up_the_loop(
@@ -171,11 +171,11 @@ def test_a_slow_policy_is_late_then_busy_and_never_holds_up_the_loop(
     worker = workers(timeout=0.02)
     misbehave(monkeypatch, act)
     began = time.perf_counter()
-    assert not worker.step(STILL, START, 0.0, None)
+    assert not worker.step(Sensed(STILL), START, 0.0)
     assert worker.problem is not None and worker.problem.startswith("late: no answer within ")
     assert worker.decision is None
     for k in range(1, 50):  # asked on: nothing is queued behind it, and nothing is waited for
-        assert not worker.step(STILL, START + k, 0.0, None)
+        assert not worker.step(Sensed(STILL), START + k, 0.0)
         assert worker.problem == "late: it is still busy with an earlier question"
     assert time.perf_counter() - began < 5.0
     assert len(asked) == 1
@@ -186,7 +186,7 @@ def test_a_slow_policy_is_late_then_busy_and_never_holds_up_the_loop(
     assert worker.state is None and worker.decision is None  # what it said too late is not taken
     worker.timeout = PATIENCE
     worker.start(STILL, START + 60)
-    assert worker.step(STILL, START + 60, 0.0, None) and worker.problem is None
+    assert worker.step(Sensed(STILL), START + 60, 0.0) and worker.problem is None
 
 
 def test_it_may_not_take_over_outside_of_its_envelope(workers: Workers) -> None:
@@ -210,10 +210,10 @@ def test_a_goal_that_can_no_longer_be_reached_is_a_problem_and_one_that_is_reach
 
     monkeypatch.setattr(worker_module, "act", answer)
     assert not worker.done
-    assert worker.step(STILL, START, 0.0, None)
+    assert worker.step(Sensed(STILL), START, 0.0)
     assert worker.problem == "gate 2 missed"
     said = {"done": True}
-    assert worker.step(STILL, START + worker.runtime.period, 0.0, None)
+    assert worker.step(Sensed(STILL), START + worker.runtime.period, 0.0)
     assert worker.done
 
 
@@ -226,7 +226,7 @@ worker_module.act = lambda *_, **__: threading.Event().wait()
 worker_module.due = lambda *_: 0.0
 worker = worker_module.PolicyWorker(None, 0.01)
 worker.state = SimpleNamespace()
-assert not worker.step(None, 1.0, 0.0, None)
+assert not worker.step(worker_module.Sensed(None), 1.0, 0.0)
 assert worker.problem.startswith("late"), worker.problem
 worker.close()
 """

@@ -30,6 +30,7 @@ from e2efly.tasks.race.goal import RaceRoute
 from e2efly.tasks.route import course_for, fields_of
 from e2efly.tasks.task import at_rest, make_task
 from e2efly.validation import evaluation
+from e2efly.validation.candidate import candidate
 from e2efly.validation.starts import draw_starts
 from e2efly.vehicles.loading import load_vehicle
 
@@ -308,10 +309,10 @@ def test_a_lone_policy_is_judged_on_tracks_of_any_kind(contract: Contract, tmp_p
     assert isinstance(weights, Weights)
     export_policy(file, weights, actor, dataclasses.replace(contract, memory_size=0))
     assert load_policy(file).contract.task == "race"
-    assert evaluation.candidate(file).task.criteria()["race"] == dataclasses.replace(ANY.task, laps=1)
+    assert candidate(file).task.criteria()["race"] == dataclasses.replace(ANY.task, laps=1)
     asked = parse_eval([str(file), "--task.track", "s_shaped", "--task.position", "0.2"])
     assert asked.task == {"track": "s_shaped", "position": 0.2}
-    found = evaluation.candidate(file, task=asked.task)
+    found = candidate(file, task=asked.task)
     assert "task.track s_shaped (not any)" in found.notes[0]
     env = found.environment(found.task)
     assert isinstance(env.task, AnyRace)

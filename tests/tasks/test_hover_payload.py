@@ -15,7 +15,7 @@ from e2efly.policy.goal import Shape
 from e2efly.runs import presets
 from e2efly.simulation.physics import Load, State
 from e2efly.tasks.hover_payload.goal import HoverPayloadRoute
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.starts import draw_starts
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.web.exported import course

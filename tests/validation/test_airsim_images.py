@@ -23,7 +23,8 @@ from e2efly.validation.airsim.airsim_images import DEPTH_PERSPECTIVE, DEPTH_PLAN
 from e2efly.validation.airsim.lockstep import AirSimSession
 from e2efly.validation.airsim.rpc import Rpc, RpcError
 from e2efly.validation.airsim.settings_file import settings, unsaid
-from e2efly.validation.evaluation import SEED, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.plant import RigidState, Shutter
 from e2efly.validation.plant_sight import Sight

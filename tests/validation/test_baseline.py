@@ -14,7 +14,7 @@ from e2efly.policy.loader import level_and_still, load_policy
 from e2efly.tasks.race.goal import CRUISE, RaceGoal
 from e2efly.tasks.track.goal import TrackGoal
 from e2efly.validation.baseline import Baseline
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.stress import stress
 from e2efly.vehicles.loading import load_vehicle
 

@@ -17,7 +17,8 @@ from e2efly.config import CameraConfig, EnvConfig, RewardConfig
 from e2efly.config.changes import changed, differing
 from e2efly.courses.references import Lissajous, knot_count
 from e2efly.environment import Env
-from e2efly.validation.evaluation import SEED, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED
 from e2efly.validation.starts import draw_starts
 
 

@@ -19,7 +19,7 @@ from e2efly.commands.hil import parse
 from e2efly.courses.origin import Origin
 from e2efly.flight.sight.shared import SharedCamera, place
 from e2efly.policy.odometry import Odometry
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_sight import rendered
 from e2efly.validation.processes import flags

@@ -17,7 +17,7 @@ from e2efly.flight.pose.pose_source import PlantSource
 from e2efly.policy.odometry import Sample
 from e2efly.simulation.scenes.meshes.load import load_mesh_scene
 from e2efly.tasks.avoid.world import Avoid
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.scenery import Scenery
 from e2efly.validation.starts import draw_starts
 from e2efly.validation.virtual_world import Node, ahead

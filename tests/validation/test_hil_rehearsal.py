@@ -15,7 +15,7 @@ from e2efly.courses.tracks import load_track, track_text
 from e2efly.flight.pose.json_source import parse_pose
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.validation import rehearse_hil
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.hil_lap import Lap, SceneChange, Spread, Truth, verdict
 from e2efly.validation.link_process import DelayLine
 from e2efly.validation.mocap_process import ATTITUDE, POSITION, Marks, MocapCamera

@@ -11,7 +11,7 @@ import pytest
 
 from e2efly.flight.sight.shared import place
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.rehearse_hil import RehearsalPlan, rehearse
 
 PATIENT = (

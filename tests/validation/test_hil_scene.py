@@ -21,7 +21,7 @@ from e2efly.flight.sight.shared import place
 from e2efly.policy.odometry import Sample
 from e2efly.simulation.scenes.meshes.mesh_scene import MeshScene
 from e2efly.simulation.scenes.scene import Scene, Solids
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.plant import RigidState
 from e2efly.validation.rehearse_hil import RehearsalPlan, draw
 from e2efly.validation.scene_files import SceneFile, beside, ground_of, load_world

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from e2efly.commands.rehearsals import fly_whole
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.rig import Rig
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.vehicle import allocation_matrix

@@ -15,6 +15,7 @@ from e2efly.environment.episodes import wilson
 from e2efly.runs import presets
 from e2efly.runs.inputs import to_json
 from e2efly.validation import evaluation, scorecard
+from e2efly.validation.candidate import candidate
 from e2efly.validation.scorecard import SEED, CardScale, Mean, entrant, parts_of, score
 from e2efly.validation.stress_laws import LAWS
 from tests.commands.test_cli import error_of
@@ -82,7 +83,7 @@ def test_a_run_is_judged_in_the_preset_of_its_task_and_not_in_its_own_options(tm
     (tmp_path / "run").mkdir()
     made(tmp_path / "run" / "policy.onnx", 0.01)
     write_json(tmp_path / "run" / "config.json", to_json(dataclasses.replace(config, task=easy)))
-    assert evaluation.candidate(tmp_path / "run").task == easy
+    assert candidate(tmp_path / "run").task == easy
     asked = benchmark.Benchmark((str(tmp_path / "run"),))
     judged = benchmark._entered(asked, str(tmp_path / "run"), tmp_path / "run.onnx")
     assert judged.task == config.task

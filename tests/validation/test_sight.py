@@ -14,7 +14,8 @@ from e2efly.environment import Env
 from e2efly.environment.stress_rows import ALL, ROWS
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.tasks.avoid_together import AvoidTogetherConfig
-from e2efly.validation.evaluation import SEED, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_sight import PlantWatch, Sight
 from e2efly.validation.plant_stress import stress

@@ -11,7 +11,7 @@ from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.images import Image
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.rehearsal import rehearse
 from e2efly.validation.scenery import Scenery
 from e2efly.vehicles.loading import load_vehicle

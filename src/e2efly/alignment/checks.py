@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from e2efly.alignment.clock_checks import on_one_clock, with_clock_rate
-from e2efly.alignment.comparison import continuous, smooth
+from e2efly.alignment.comparison import continuous, runs, smooth
 from e2efly.alignment.damage_checks import check_columns, with_battery, within_limits, without_frozen
 from e2efly.alignment.frame_checks import in_one_frame, judged_frames
 from e2efly.alignment.rotor_checks import (
@@ -158,10 +158,8 @@ def _in_the_air(record: Record, vehicle: Vehicle) -> Record:
         raise ValueError(f"{record.path}: never leaves the ground; accepted: a flight")
     if flying.mean() > 0.98:
         return record
-    edges = np.diff(np.concatenate([[0], flying.astype(int), [0]]))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     # moments of low thrust, as in a fall, are part of a flight
-    spans = [[stream.time[s], stream.time[e]] for s, e in zip(starts, ends, strict=True)]
+    spans = [[float(stream.time[s]), float(stream.time[e])] for s, e in zip(*runs(flying), strict=True)]
     joined = [spans[0]]
     for span in spans[1:]:
         if span[0] - joined[-1][1] < 0.5:

@@ -57,6 +57,12 @@ def turns(pose: Stream) -> Stream:
     return Stream(pose.time[:-1] + passed / 2, 2 * away[:, 1:] * np.sign(away[:, :1]) / passed[:, None])
 
 
+def runs(there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First and last index of each run of truth in (n,) booleans."""
+    edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+
+
 def lagged(values: np.ndarray, constant: float, step: float) -> np.ndarray:
     """Values, (..., t), after a first-order lag, s, on a grid of a step, s, beginning at rest."""
     kept = np.exp(-step / max(constant, 1e-6))

@@ -10,14 +10,7 @@ from e2efly.alignment.coarse import begin
 from e2efly.alignment.estimates import Estimate
 from e2efly.alignment.found import FittedPart, Found, Refusal, estimates_of, is_vague, refusals_of, whole_covariance
 from e2efly.alignment.misfit import LeftOver, widened
-from e2efly.alignment.model import (
-    FROM_ZERO,
-    POSE_DELAY,
-    UNKNOWNS,
-    Model,
-    from_zero,
-    vehicle_of,
-)
+from e2efly.alignment.model import FROM_ZERO, POSE_DELAY, UNKNOWNS, Model, from_zero, vehicle_of
 from e2efly.alignment.rotor_response import LITTLE, RESPONSE, responded
 from e2efly.alignment.shooting import Fit, fit
 from e2efly.alignment.windows import LENGTH, LENGTHS, REACH, Windows, cut, join

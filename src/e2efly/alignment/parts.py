@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.alignment.estimates import Estimate
-from e2efly.alignment.purchases import Purchase, read_ground, read_purchase
+from e2efly.alignment.purchases import Purchase, check_keys, read_ground, read_purchase
 from e2efly.config.names import unknown
 from e2efly.config.tables import number, numbers, read_table, shown, text
 from e2efly.control import Quat, Vec3
@@ -180,11 +180,7 @@ def _listed(path: Path) -> dict[str, list[Any]]:
 
 
 def _part(where: str, entry: Any, folder: Path) -> Part:
-    if not isinstance(entry, dict):
-        raise ValueError(f"{where} is {shown(entry)}; accepted: a table [[part]]")
-    for key in entry:
-        if key not in _KEYS:
-            raise ValueError(f"{where}: {unknown('key', key, sorted(_KEYS))}")
+    check_keys(where, entry, "part", _KEYS)
     if missing := [key for key in ("name", "shape", "mass", "place") if key not in entry]:
         raise ValueError(f"{where}: missing key {', '.join(map(repr, missing))}")
     name = text(f"{where}: name", entry["name"])

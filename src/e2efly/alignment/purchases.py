@@ -1,6 +1,7 @@
 """What a list of parts says about buying a part: its price, and where its mass and its price come from."""
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,15 +58,24 @@ def read_purchase(where: str, entry: dict[str, Any], count: int) -> Purchase:
 
 def read_ground(where: str, entry: Any) -> Purchase:
     """An entry `[[ground]]`. Arguments and errors are as for `read_purchase`."""
-    if not isinstance(entry, dict):
-        raise ValueError(f"{where} is {shown(entry)}; accepted: a table [[ground]]")
-    for key in entry:
-        if key not in KEYS:
-            raise ValueError(f"{where}: {unknown('key', key, sorted(KEYS))}")
+    check_keys(where, entry, "ground", KEYS)
     count = entry.get("count", 1)
     if type(count) is not int or count < 1:
         raise ValueError(f"{where}: count is {shown(count)}; accepted: a whole number, 1 or more")
     return read_purchase(where, entry, count)
+
+
+def check_keys(where: str, entry: Any, name: str, keys: Collection[str]) -> None:
+    """Refuse an entry that is no table [[name]], or has other keys.
+
+    Raises:
+        ValueError: naming it, and what is accepted.
+    """
+    if not isinstance(entry, dict):
+        raise ValueError(f"{where} is {shown(entry)}; accepted: a table [[{name}]]")
+    for key in entry:
+        if key not in keys:
+            raise ValueError(f"{where}: {unknown('key', key, sorted(keys))}")
 
 
 def _words(where: str, given: Any) -> dict[str, str]:

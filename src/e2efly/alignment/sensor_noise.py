@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from e2efly.alignment.comparison import attitudes, common_times, smooth, turns
+from e2efly.alignment.comparison import attitudes, common_times, runs, smooth, turns
 from e2efly.control import Quat, Vec3
 from e2efly.logs.recording import Record, Stream, listed
 from e2efly.vehicles.gravity import GRAVITY
@@ -74,8 +74,7 @@ def hover_of(record: Record) -> Record:
     calm = np.linalg.norm(_averaged(stream), axis=1) < CALM_RATE
     if (speed := _velocity(record)) is not None:
         calm &= np.interp(stream.time, speed.time, np.linalg.norm(_averaged(speed), axis=1)) < CALM_SPEED
-    edges = np.diff(np.concatenate([[0], calm.astype(int), [0]]))
-    begin, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    begin, end = runs(calm)
     length = stream.time[end] - stream.time[begin] if len(begin) else np.zeros(1)
     longest = int(np.argmax(length))
     if length[longest] < LEAST_S:

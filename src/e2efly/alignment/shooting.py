@@ -18,17 +18,7 @@ from jax import Array
 
 from e2efly.alignment.least_squares import HUBER, huber, jackknife
 from e2efly.alignment.misfit import LeftOver, left_over, white_by
-from e2efly.alignment.model import (
-    FACTOR,
-    FORCE,
-    GYRO,
-    NUISANCES,
-    WIND,
-    Model,
-    attitude_error,
-    from_zero,
-    simulate,
-)
+from e2efly.alignment.model import FACTOR, FORCE, GYRO, NUISANCES, WIND, Model, attitude_error, from_zero, simulate
 from e2efly.alignment.windows import LENGTH, Windows
 
 NOISE = {
@@ -145,13 +135,14 @@ def _fit(
     def total(p: np.ndarray, q: np.ndarray, costs: np.ndarray) -> float:
         return float(np.sum(costs) + 0.5 * np.sum((p / prior_p) ** 2) + 0.5 * np.sum((q / prior_q) ** 2))
 
+    known = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
     damping, i, held = 1e-3, 0, np.zeros(0, int)
     at = partial(_at, model, data, free)
     cost = total(p, q, at(_costs, p, q, starts, noise)["cost"])
     terms = at(_slopes, p, q, starts, noise)
     for i in range(1, iterations + 1):
         H, g = _assembled(terms, windows.flight, flights, u, v)
-        H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+        H += known
         g += np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
         held = np.flatnonzero((p <= least) & (g[:u] > 0))  # a delay below zero is impossible
         H[held, held] *= 1e12
@@ -180,7 +171,7 @@ def _fit(
         if settled and (gained < 1e-3 or np.all(still)):
             break
     H, _ = _assembled(terms, windows.flight, flights, u, v)
-    H += np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+    H += known
     inverse = np.linalg.inv(H)
     each = np.zeros((windows.count, len(H)))
     each[:, :u] = terms["g"][:, :u]
@@ -193,10 +184,10 @@ def _fit(
     groups = np.zeros((group[-1] + 1, len(H)))
     np.add.at(groups, group, each)
     inner = groups.T @ groups * (len(groups) / max(len(groups) - 1, 1))
-    sandwich = inverse @ (inner + np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))) @ inverse
+    sandwich = inverse @ (inner + known) @ inverse
     parts = [_assembled(terms, np.where(windows.flight == f, f, -1), flights, u, v) for f in range(flights)]
     pulled = np.concatenate([p / prior_p**2, (q / prior_q**2).ravel()])
-    stiff = np.diag(np.concatenate([prior_p**-2, np.tile(prior_q**-2, flights)]))
+    stiff = known.copy()
     stiff[held, held] *= 1e12
     between = jackknife(np.stack([H for H, _ in parts]), np.stack([g for _, g in parts]), stiff, pulled)[:u]
     left = _left(at(_costs, p, q, starts, noise))

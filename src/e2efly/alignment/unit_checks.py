@@ -13,8 +13,6 @@ AGREE = 0.7
 UNIT_OFF, LIVELY = 2.0, 3.0
 """`UNIT_OFF`: ratio to what another stream, or gravity, shows from which on a stream has another unit. `LIVELY`: up to
 so many times gravity is typical of a specific force in a log that shows neither rest nor motion."""
-HARDEST = 4.0
-"""Median specific force over gravity that no flight exceeds."""
 CALM_S, CALM_RATE = 0.2, 0.3
 """Length of a piece, s, and largest body rate in it, rad/s, of a vehicle that is at rest or hovers."""
 LIKELY = {

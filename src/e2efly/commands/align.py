@@ -87,10 +87,7 @@ def run(options: Align) -> int:
     prepare("cpu")
     with console.status("fitting") as status:
         found = align(
-            vehicle,
-            records,
-            pose_delay,
-            told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}"),
+            vehicle, records, pose_delay, told=lambda i, cost: status.update(f"fitting: iteration {i}, cost {cost:.1f}")
         )
     estimates = {e.name: e for e in found.estimates}
     loop = _closed_loop(options, console, records, vehicle, merged(vehicle, estimates), found)
@@ -129,12 +126,7 @@ def run(options: Align) -> int:
 
 
 def _closed_loop(
-    options: Align,
-    console: Terminal,
-    records: "list[Record]",
-    vehicle: Vehicle,
-    aligned: Vehicle,
-    found: "Alignment",
+    options: Align, console: Terminal, records: "list[Record]", vehicle: Vehicle, aligned: Vehicle, found: "Alignment"
 ) -> "ClosedLoop | None":
     """The simulator's flight by the policy of the first log in which one flew. None: none did, or its file is gone.
 

@@ -21,7 +21,8 @@ from e2efly.policy.zoo import beside
 from e2efly.vehicles.vehicle import Controller
 
 if TYPE_CHECKING:
-    from e2efly.validation.evaluation import Candidate, Evaluation
+    from e2efly.validation.candidate import Candidate
+    from e2efly.validation.evaluation import Evaluation
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def parse(arguments: list[str]) -> Asked:
     if not given or asks_help(arguments):
         return Asked(parse_options(Eval, "eval", arguments), {})
     found = named_first("eval", arguments, given[0])
-    from e2efly.validation.evaluation import pinned
+    from e2efly.validation.candidate import pinned
 
     own = pinned(found.env, found.policy)
     empty = dataclasses.replace(own, randomize={})  # a filled dictionary would take no new names

@@ -115,7 +115,7 @@ def _write_page(options: Export, folder: Path) -> int:
     why = "has no effect with --web: a page flies the policy.onnx that there is"
     _without_effect(options, ("out", "which"), why)
     prepare("cpu")
-    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.candidate import candidate
     from e2efly.viewing.web.page import write_page
 
     found = candidate(options.run, options.vehicle)

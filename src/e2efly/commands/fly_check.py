@@ -11,11 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from e2efly.commands.terminal import headed
+from e2efly.flight.attitude import attitude_of
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.commander.commander import Commander
 from e2efly.flight.pilot.estimate import StateEstimate
 from e2efly.flight.pilot.flight_state import Mission
-from e2efly.flight.pilot.hover import roll_pitch
 from e2efly.flight.pilot.refusals import take_off_refusals
 from e2efly.flight.pilot.sensing import sensed
 from e2efly.flight.pose.pose_source import PoseSource
@@ -159,12 +159,12 @@ def _add_poses(table: Table, bridge: Bridge, source: PoseSource, poses: list[Sam
     if o is None:
         table.add_row("poses", _cell(f"none good from {source.describe()}: {bridge.inputs.odometry_problem}"))
         return
-    roll, pitch = roll_pitch(o.quaternion)
+    place, at = o.position.round(3).tolist(), attitude_of(*o.quaternion.tolist())
     age = sum(s.received - (s.stamp or s.received) for s in poses) / max(len(poses), 1)
     pace = bridge.estimate.pace
     said = f"{pace.rate:.0f} Hz from {source.describe()}, refused {refused}"
     table.add_row("poses", _cell(f"{said}; the newest was up to {1e3 * pace.oldest:.0f} ms old"))
-    table.add_row("", _cell(f"position {o.position.round(3).tolist()} m, roll {roll:+.2f}, pitch {pitch:+.2f} rad"))
+    table.add_row("", _cell(f"position {place} m, roll {at.roll:+.2f}, pitch {at.pitch:+.2f} rad"))
     if poses and poses[-1].stamp is not None:
         table.add_row("", f"arrival after stamp {1e3 * age:.1f} ms (where both clocks are one)")
 

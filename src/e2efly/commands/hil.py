@@ -75,7 +75,7 @@ def run(asked: Asked) -> int:
     from e2efly.flight.sight.recorder import Recorder
     from e2efly.flight.sight.shared import SharedImages
     from e2efly.simulation.device import compute_at_once, prepare
-    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.candidate import candidate
     from e2efly.validation.scenery import Scenery
     from e2efly.validation.virtual_world import Node
 

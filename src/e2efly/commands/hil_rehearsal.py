@@ -74,7 +74,7 @@ def rehearse(o: Hil, task: dict[str, Any], origin: Origin, fence: Fence | None) 
     """
     from e2efly.simulation.device import prepare
     from e2efly.validation import firmware_program
-    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.candidate import candidate
     from e2efly.validation.processes import flags
     from e2efly.validation.rehearse_hil import RehearsalPlan, draw
     from e2efly.validation.rehearse_hil import rehearse as fly

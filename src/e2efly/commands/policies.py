@@ -12,7 +12,7 @@ from e2efly.config import TaskConfig
 from e2efly.config.changes import differing
 
 if TYPE_CHECKING:
-    from e2efly.validation.evaluation import Candidate
+    from e2efly.validation.candidate import Candidate
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def named_first(command: str, arguments: list[str], given: str) -> "Candidate":
     if arguments[0].startswith("-"):
         option = given.split(".")[0]
         raise ValueError(f"{command} begins with {arguments[0]}; accepted: the policy first, where {option}.* is given")
-    from e2efly.validation.evaluation import candidate
+    from e2efly.validation.candidate import candidate
 
     return candidate(arguments[0], peek(arguments, "--vehicle"))
 

@@ -13,7 +13,7 @@ from e2efly.commands.terminal import headed
 from e2efly.flight.settings import Fence
 from e2efly.tasks.route import Route, route_of
 from e2efly.validation import firmware_program
-from e2efly.validation.evaluation import Candidate
+from e2efly.validation.candidate import Candidate
 from e2efly.validation.gate_pose import GateCamera
 from e2efly.validation.rehearsal import Rehearsal, rehearse
 from e2efly.validation.scenery import Scenery

@@ -227,10 +227,7 @@ def _options(config: TrainConfig, preset: str) -> tuple[type, Any]:
     """The options of `train`: a dataclass and its defaults, which are those of a configuration."""
     task, algo = config.task.name, config.algo.name
     every: list[tuple[str, Any]] = [
-        (
-            "task_name",
-            tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}, {_OWN}.", metavar="TASK")],
-        ),
+        ("task_name", tyro.conf.Positional[_help(str, f"What to learn: {_join(TASKS)}, {_OWN}.", metavar="TASK")]),
         ("algo_name", _help(str, f"Algorithm: {_join(ALGORITHMS)}, {_OWN}.", name="algo")),
         (
             "config",

@@ -22,7 +22,7 @@ from e2efly.policy.zoo import beside
 from e2efly.vehicles.vehicle import Controller
 
 if TYPE_CHECKING:
-    from e2efly.validation.evaluation import Candidate
+    from e2efly.validation.candidate import Candidate
     from e2efly.validation.plant_validation import Validation
 
 WHOLE_S = 1.0

@@ -199,7 +199,7 @@ def _poses(o: WatchOptions) -> "Iterator[Any]":
 
         prepare("cpu")
         from e2efly.simulation.scenes.scene import Scene
-        from e2efly.validation.evaluation import candidate
+        from e2efly.validation.candidate import candidate
         from e2efly.validation.scenery import Scenery
 
         found = candidate(o.world, o.vehicle)
@@ -280,7 +280,8 @@ def _flown(o: WatchOptions, console: Terminal) -> "tuple[Simulation, ShownProgre
 
     prepare("cpu")
     from e2efly.runs.rundir import RunDirectory
-    from e2efly.validation.evaluation import act_of, candidate
+    from e2efly.validation.candidate import candidate
+    from e2efly.validation.evaluation import act_of
     from e2efly.viewing.watch.simulation import Simulation
 
     what = Path(o.what[0])

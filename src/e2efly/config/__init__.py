@@ -9,6 +9,7 @@ from e2efly.config.algorithms import (
     ABPTConfig,
     AlgorithmConfig,
     BPTTConfig,
+    DAggerConfig,
     FOPPOConfig,
     PPOConfig,
     SHACConfig,
@@ -28,16 +29,7 @@ from e2efly.config.env import (
 )
 from e2efly.config.numbers import check_fields, number, shape
 from e2efly.config.random_worlds import CLUTTER, ClutterConfig, ForestConfig
-from e2efly.config.run import (
-    NetworkConfig,
-    Paper,
-    RewardConfig,
-    Robust,
-    Sourced,
-    StageConfig,
-    TaskConfig,
-    TrainConfig,
-)
+from e2efly.config.run import NetworkConfig, Paper, RewardConfig, Robust, Sourced, StageConfig, TaskConfig, TrainConfig
 
 __all__ = [
     "AHEAD",
@@ -49,6 +41,7 @@ __all__ = [
     "BPTTConfig",
     "CameraConfig",
     "ClutterConfig",
+    "DAggerConfig",
     "DisturbanceConfig",
     "EnvConfig",
     "EstimateConfig",

@@ -272,3 +272,22 @@ class FOPPOConfig(_Proximal, _FirstOrder):
     """Learning rate of the step along the exact gradient, relative to that of the epochs."""
     gamma: float = number(0.98, above=0, high=1)
     """Discount per step."""
+
+
+@register("dagger")
+@dataclass(frozen=True)
+class DAggerConfig(_Annealed):
+    """Imitation of a policy that is told more, on the states that the learner meets (Ross et al. 2011)."""
+
+    program: ClassVar = "e2efly.learning.dagger:DAgger"
+    like: ClassVar = "bptt"
+
+    horizon: int = number(32, above=0)
+    """Steps of a window, over which the gradient of a GRU is propagated back (sets shapes)."""
+    teacher: str = ""
+    """The policy that is imitated: a task of the zoo, a run, or a policy.onnx, without cameras. If it is empty, the
+    zoo's policy of the task (sets the program)."""
+    led: float = number(0.15, high=1.0)
+    """Share of the run in which the teacher flies, too: in all windows at its start, in none from then on."""
+    learning_rate: float = number(2e-3, above=0, high=1.0)
+    """Learning rate of Adam at the start."""

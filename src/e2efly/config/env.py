@@ -142,7 +142,8 @@ class ImuConfig:
     """Noise of a consumer IMU: white noise, given as a density, and a bias that follows a random walk."""
 
     observed: bool = False
-    """Whether the gyroscope and the accelerometer are part of the observation (sets shapes)."""
+    """Whether the gyroscope and the accelerometer are part of the observation. They are, too, if task.observes names
+    one of them (sets shapes)."""
     gyro_noise: float = number(8.7e-5, high=BODY_RATE)
     """Gyroscope white noise, rad/s/sqrt(Hz)."""
     gyro_bias: float = number(2.23e-5, high=BODY_RATE)

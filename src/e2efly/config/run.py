@@ -240,6 +240,9 @@ class TaskConfig:
 
     episode_s: float = number(10.0, above=0)
     """Length of an episode, s."""
+    observes: tuple[str, ...] | None = shape(None, added=True)
+    """Names of the fields that the policy observes, of the task's own and of the vehicle's. None: all that there are.
+    Rewards, critics and experts know the others all the same (sets shapes)."""
 
     @classmethod
     def training(cls) -> "TaskConfig":
@@ -291,8 +294,7 @@ class TaskConfig:
 
     def shows(self, name: str) -> bool:
         """Whether the policy observes the task's own field of this name."""
-        del name
-        return True
+        return self.observes is None or name in self.observes
 
     def showing(self, names: Sequence[str]) -> "TaskConfig":
         """These options, adapted to a policy whose observation has fields with these names, if the task has several

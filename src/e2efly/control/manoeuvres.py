@@ -230,12 +230,7 @@ def homewards(centre: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def excite(
-    vehicle: Vehicle,
-    room: ManoeuvreRoom,
-    schedule: Schedule,
-    before: ManoeuvreProgress,
-    time: float,
-    motion: Motion,
+    vehicle: Vehicle, room: ManoeuvreRoom, schedule: Schedule, before: ManoeuvreProgress, time: float, motion: Motion
 ) -> tuple[ManoeuvreProgress, Ctbr]:
     """One control step of a schedule. Pure. The gains of `vehicle` are used to steer. `time` is that since the
     beginning, s. `before` is the state from `ManoeuvreProgress.begin` or from the last step.

@@ -65,9 +65,7 @@ class Vec3:
         """Each axis clipped to [-limit, limit]."""
         xp = namespace(self.x, limit.x)
         return Vec3(
-            xp.clip(self.x, -limit.x, limit.x),
-            xp.clip(self.y, -limit.y, limit.y),
-            xp.clip(self.z, -limit.z, limit.z),
+            xp.clip(self.x, -limit.x, limit.x), xp.clip(self.y, -limit.y, limit.y), xp.clip(self.z, -limit.z, limit.z)
         )
 
     def dot(self, other: "Vec3") -> Array:

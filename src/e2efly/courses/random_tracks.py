@@ -100,25 +100,11 @@ class TrackStyle:
 
 
 RACING = TrackStyle(
-    most=12,
-    leg=(3.5, 18.0),
-    opening=(0.6, 1.5),
-    top=(4.0, 8.0),
-    pieces=1.0,
-    farthest=50.0,
-    rise=6.7,
-    bearing=2.85,
+    most=12, leg=(3.5, 18.0), opening=(0.6, 1.5), top=(4.0, 8.0), pieces=1.0, farthest=50.0, rise=6.7, bearing=2.85
 )
 """Tracks to race on as fast as one can."""
 CLUTTERED = TrackStyle(
-    most=6,
-    leg=(5.0, 12.0),
-    opening=(1.0, 1.0),
-    top=(2.5, 4.0),
-    pieces=HAIRPINS,
-    farthest=30.0,
-    rise=2.7,
-    bearing=2.9,
+    most=6, leg=(5.0, 12.0), opening=(1.0, 1.0), top=(2.5, 4.0), pieces=HAIRPINS, farthest=30.0, rise=2.7, bearing=2.9
 )
 """Tracks on which there is room for obstacles between the gates."""
 
@@ -161,11 +147,7 @@ def _candidates(u: Any, style: TrackStyle) -> Tracks:
     away, beside = _between((2.5, 6.0), head[8]), 1.6 * (head[9] - 0.5)
     way = yaw[..., 0] + beside
     start = xp.stack(
-        [
-            x[..., 0] - away * xp.cos(way),
-            y[..., 0] - away * xp.sin(way),
-            xp.maximum(z[..., 0] + 2 * head[10] - 1, 0.8),
-        ],
+        [x[..., 0] - away * xp.cos(way), y[..., 0] - away * xp.sin(way), xp.maximum(z[..., 0] + 2 * head[10] - 1, 0.8)],
         axis=-1,
     )
     start_yaw = way + 0.8 * (lie[..., 0] - 0.5)

@@ -48,9 +48,10 @@ from e2efly.environment.env_state import (
 )
 from e2efly.environment.limits import latencies_of, limits_of, posterior_of
 from e2efly.environment.privileged import OTHER_SIZE, SCENE_SIZE, of_others, of_scene
-from e2efly.environment.rules import check
+from e2efly.environment.rules import check, hidden
 from e2efly.environment.signals import dangers, happened
-from e2efly.policy.observation import Field, Known, Own, own_fields
+from e2efly.policy.goal import Goal
+from e2efly.policy.observation import OWN, Field, Known, Own, own_fields
 from e2efly.simulation import rewards
 from e2efly.simulation.physics import Physics, State, started, step
 from e2efly.simulation.physics.body import hover_rotor_speed
@@ -65,6 +66,8 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 from e2efly.vehicles.vehicle import Flown
 
+INERTIAL_FIELDS = tuple(row.field.name for row in OWN if row.source == "imu")
+"""Names of the fields of an IMU. A task that names one to be observed has an IMU."""
 DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
@@ -185,6 +188,9 @@ class Env:
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         flown_task = _flown_task(task, shape, physics)
+        felt = config.imu.observed or any(field in (task.observes or ()) for field in INERTIAL_FIELDS)
+        mine = own_fields(imu=felt, actions=seen, size=len(low))
+        unseen = hidden(task, flown_task, [row.field for row in mine])
         if getattr(flown_task, "agents", 1) == 1:
             for name, off in (("downwash", 0), ("central_critic", False)):
                 if value := getattr(config, name):
@@ -213,13 +219,14 @@ class Env:
             link=None if config.link == LinkConfig() else config.link,
             noise=config.noise if noisy else None,
             payload=config.payload if config.payload.mass[1] else None,
-            imu=config.imu if config.imu.observed else None,
+            imu=config.imu if felt else None,
             cameras=config.cameras,
             queue=max(frames + 1, seen, 2),
             seen_actions=seen,
             past=latency.frames(oldest, period) + 1 if oldest else 0,
             family=family if flown is None else None,
             central=config.central_critic,
+            unseen=unseen,
         )
 
     def on(self, task: TaskConfig) -> "Env":
@@ -287,9 +294,15 @@ class Env:
         return tuple(row for row in rows if row.field.name not in self.unseen)
 
     def showing(self, names: Sequence[str]) -> "Env":
-        """The same environment, with only those of the vehicle's own fields that have these names."""
-        hidden = (row.field.name for row in self._own if row.field.name not in names)
-        return dataclasses.replace(self, unseen=(*self.unseen, *hidden))
+        """The same environment, with an observation of only those fields that have these names."""
+        task, every = self.task, dataclasses.replace(self, unseen=())
+        if isinstance(task, Goal) and isinstance(task.config, TaskConfig):
+            config = dataclasses.replace(task.config.showing(names), observes=None)
+            task = dataclasses.replace(task, config=config)
+            if any(field.name not in names for field in task.fields):
+                task = dataclasses.replace(task, config=dataclasses.replace(config, observes=tuple(names)))
+        unseen = tuple(row.field.name for row in every._own if row.field.name not in names)
+        return dataclasses.replace(self, task=task, unseen=unseen)
 
     @property
     def observation_size(self) -> int:

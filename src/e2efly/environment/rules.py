@@ -1,9 +1,12 @@
 """Checks of the numbers of an environment's configuration."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any
 
-from e2efly.config import EnvConfig, check_fields
+from e2efly.config import EnvConfig, TaskConfig, check_fields
 from e2efly.config.numbers import LATEST
+from e2efly.policy.observation import Field
 from e2efly.simulation.physics.integrate import SWINGING
 from e2efly.simulation.scenes.camera import check as check_camera
 from e2efly.simulation.sensors.image_noise import check as check_noise
@@ -68,6 +71,33 @@ def check(
             f"these cannot hover (thrust to weight {drawn:.2f}; {config.vehicle} has {margin:.2f}); accepted: draws "
             "that leave at least 1"
         )
+
+
+def hidden(options: TaskConfig, task: Any, own: Sequence[Field]) -> tuple[str, ...]:
+    """The names of the vehicle's own fields that a task's option `observes` leaves out.
+
+    Args:
+        options: the options of the task.
+        task: the task that they make.
+        own: the vehicle's own fields.
+
+    Raises:
+        ValueError: for a name that is no field, and where the attitude is left out.
+    """
+    if options.observes is None:
+        return ()
+    rows = getattr(task, "observation", None)
+    shown = task.fields if rows is None else [field for field, _ in rows]
+    known = {field.name: field for field in (*shown, *own)}
+    if strange := [name for name in options.observes if name not in known]:
+        raise ValueError(f"task.observes has {', '.join(strange)}; accepted: some of {', '.join(known)}")
+    needed = next(field.name for field in known.values() if field.frame == "world_body")
+    if needed not in options.observes:
+        raise ValueError(
+            f"task.observes is {', '.join(options.observes) or 'empty'}; accepted: with {needed}, of which a policy "
+            "gets where up is"
+        )
+    return tuple(field.name for field in own if field.name not in options.observes)
 
 
 def check_frames(config: EnvConfig, name: str) -> None:

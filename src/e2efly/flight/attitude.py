@@ -1,6 +1,7 @@
 """An attitude as the flight controller estimates it. Apart from odometry, because the watchdog starts without NumPy."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -24,6 +25,15 @@ def attitude_of(w: float, x: float, y: float, z: float) -> Attitude:
         math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
         math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
     )
+
+
+def level(attitude: Attitude, vector: Iterable[float]) -> tuple[float, float, float]:
+    """A vector of the body, FLU, in level axes that point along the heading."""
+    x, y, z = map(float, vector)
+    cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
+    cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
+    lifted = sr * y + cr * z
+    return cp * x + sp * lifted, cr * y - sr * z, cp * lifted - sp * x
 
 
 def turned(attitude: Attitude, rate: tuple[float, float, float], dt: float) -> Attitude:

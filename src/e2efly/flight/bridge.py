@@ -43,7 +43,7 @@ from e2efly.flight.sight.image_source import ImageSource
 from e2efly.flight.sight.quality import SeenImages
 from e2efly.policy.odometry import Odometry, Sample, yaw_of
 from e2efly.policy.runtime import Decision, Imu
-from e2efly.policy.worker import Worker
+from e2efly.policy.worker import Sensed, Worker
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 from e2efly.vehicles.vehicle_rules import check_level
@@ -246,11 +246,7 @@ class Bridge:
             override=report.override,
             pilot=report.pilot,
             voltage=report.voltage,
-            settings_problems=(
-                *self.settings_problems,
-                *report.problems,
-                *((slow,) if slow else ()),
-            ),
+            settings_problems=(*self.settings_problems, *report.problems, *((slow,) if slow else ())),
             policy_problem=report.policy_problem or self._blindness(now) or self._unfiltered,
             filtered=self.keeper is not None,
             attitude_error=told.attitude_error(report.attitude),
@@ -354,7 +350,7 @@ class Bridge:
             images = [frame.image.astype(np.float32) for frame in frames]
             near, count = self.neighbours, worker.neighbours
             others = None if near is None or not count else near.nearest(odometry, now, count)
-            if worker.step(odometry, now, slack, self.imu, images, others) and self.log is not None:
+            if worker.step(Sensed(odometry, self.imu, images, others), now, slack) and self.log is not None:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
             self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,

@@ -9,15 +9,15 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from e2efly.config import ALGORITHMS
+from e2efly.config import ALGORITHMS, NetworkConfig
+from e2efly.learning import raptor_actor
 from e2efly.learning.checkpoint import read_arrays
 from e2efly.learning.networks import Actor, Gru, Layers, Weights
 from e2efly.learning.onnx_export import contract_of
 from e2efly.learning.onnx_layers import OPERATORS
-from e2efly.learning.raptor_actor import RaptorActor, weights_of
 from e2efly.learning.setup import Setup
 from e2efly.policy.contract import Contract
-from e2efly.policy.loader import OUTPUT, load_policy
+from e2efly.policy.loader import OUTPUT, Policy, load_policy
 from e2efly.policy.raptor.raptor_network import parameters_of
 from e2efly.runs.rundir import run_of
 
@@ -46,13 +46,13 @@ def started_from(parameters: Any, path: Path, setup: Setup) -> Any:
             raise ValueError(
                 f"start_from {path}: its {name} is {value}; accepted: {accepted}, as this run's policy has{hint}"
             )
-    if isinstance(setup.actor, RaptorActor):
+    if isinstance(setup.actor, raptor_actor.RaptorActor):
         try:
-            weights = weights_of(parameters_of(loaded))
+            weights = raptor_actor.weights_of(parameters_of(loaded))
         except ValueError as error:
             raise ValueError(f"start_from {path}: {error}") from None
     else:
-        weights = _weights(path, loaded.content, parameters.policy, setup.actor)
+        weights = weights_of(path, loaded.content, parameters.policy, setup.actor)
     copies = {
         field.name: weights
         for field in dataclasses.fields(parameters)
@@ -78,8 +78,28 @@ def _of_run(parameters: Any, path: Path, setup: Setup) -> Any:
     return jax.tree_util.tree_unflatten(structure, [x[0] for x in found if x is not None])  # every device has the same
 
 
-def _weights(path: Path, content: bytes, like: Weights, actor: Actor) -> Weights:
-    """Read the weights that `e2efly.learning.onnx_layers.policy_graph` has written."""
+def network_of(path: Path, loaded: Policy) -> NetworkConfig:
+    """The options of the network in a policy's file, for a policy without images.
+
+    Raises:
+        ValueError: for a file that e2efly's training has not written, naming it.
+    """
+    graph = onnx.load_model_from_string(loaded.content).graph
+    widths = {x.name: x.dims[-1] for x in graph.initializer}
+    layers = [int(widths[name]) for i in range(len(widths)) if (name := f"weight_{i}") in widths]
+    made = next((node.op_type for node in graph.node if "hidden_1" in node.output), None)
+    activation = next((name for name, operator in OPERATORS.items() if operator == made), None)
+    if len(layers) < 2 or activation is None:
+        raise ValueError(f"{path}: it has no hidden layers of e2efly; accepted: a policy that e2efly has trained")
+    return NetworkConfig(tuple(layers[:-1]), activation, recurrent=loaded.contract.memory_size)
+
+
+def weights_of(path: Path, content: bytes, like: Weights, actor: Actor) -> Weights:
+    """Read the weights that `e2efly.learning.onnx_layers.policy_graph` has written, for a network like `like`.
+
+    Raises:
+        ValueError: for a network of other sizes or another activation, naming the file.
+    """
     graph = onnx.load_model_from_string(content).graph
     constants = {x.name: numpy_helper.to_array(x) for x in graph.initializer}
     operators = {node.output[0]: node.op_type for node in graph.node}

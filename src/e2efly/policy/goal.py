@@ -1,6 +1,7 @@
 """What a task shows to a policy, and how it judges it: the same code in training (JAX) and in flight (NumPy)."""
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
@@ -125,6 +126,8 @@ class Goal:
     def observe(self, memory: Any, time: Array, state: Any) -> Array:
         """(n, o) the task's own observation fields, for the body state that the policy is given."""
         parts = [value(self, memory, time, state) for _, value in self.shown]
+        if not parts:
+            return state.position[..., :0]
         return parts[0] if len(parts) == 1 else namespace(*parts).concatenate(parts, axis=-1)
 
     @property
@@ -149,6 +152,15 @@ class Goal:
     def goal(self, memory: Any, time: Array) -> Array:
         """(n, 3) position to be at now, world, m."""
         raise NotImplementedError
+
+    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
+        """(n, 3) the position to be at now minus that of the body, world, m: a field of many tasks."""
+        return self.goal(memory, time) - body.position
+
+    def fence(self, memory: Any) -> Any:
+        """Distance from the goal at which an episode ends, m, a number or (n,). Infinite: at none."""
+        del memory
+        return getattr(self.config, "fence", math.inf)
 
     @classmethod
     def aim(cls, shown: Mapping[str, Array]) -> Place:

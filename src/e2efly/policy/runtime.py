@@ -358,7 +358,7 @@ def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeStat
     local = odometry.seen_from(course.origin)
     task, elapsed = (course.memory, 0.0) if state is None else (state.task, now - state.began)
     where = np.asarray(course.goal.goal(task, np.array([elapsed])))[0]
-    fence = getattr(course.goal.config, "fence", math.inf) if envelope.distance is None else envelope.distance
+    fence = np.max(course.goal.fence(task)) if envelope.distance is None else envelope.distance
     limits = (
         ("speed", float(np.linalg.norm(local.velocity)), envelope.speed, "m/s"),
         ("tilt", tilt_of(local.quaternion), envelope.tilt, "rad"),

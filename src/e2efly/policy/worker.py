@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Late
 from contextlib import suppress
+from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any, Protocol
 
@@ -18,6 +19,20 @@ from e2efly.policy.odometry import Odometry
 from e2efly.policy.others import Others
 from e2efly.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
 from e2efly.vehicles.gravity import GRAVITY
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What a step decides by."""
+
+    odometry: Odometry
+    """The newest motion."""
+    imu: Imu | None = None
+    """The newest measurement, if there is one."""
+    images: Sequence[np.ndarray] = ()
+    """The newest image of each camera, in the order of `Worker.images`."""
+    others: Others | None = None
+    """The nearest other vehicles, `Worker.neighbours` at most."""
 
 
 class Worker(Protocol):
@@ -80,16 +95,8 @@ class Worker(Protocol):
         """Stop its flight."""
         ...
 
-    def step(
-        self,
-        odometry: Odometry,
-        now: float,
-        slack: float,
-        imu: Imu | None,
-        images: Sequence[np.ndarray] = (),
-        others: Others | None = None,
-    ) -> bool:
-        """Let it decide. Returns whether there is a new decision to record."""
+    def step(self, sensed: Sensed, now: float, slack: float) -> bool:
+        """Let it decide at `now` s, if it is due within `slack` s. Returns whether there is a new decision."""
         ...
 
     def close(self) -> None:
@@ -113,7 +120,7 @@ class PolicyWorker:
         """The last decision. It is flown until the next one is due."""
         self.problem: str | None = None
         """The reason for the policy's failure in this flight."""
-        self._questions: SimpleQueue[tuple[Future, tuple[Any, ...]] | None] = SimpleQueue()
+        self._questions: SimpleQueue[tuple[Future, RuntimeState, Sensed, float] | None] = SimpleQueue()
         self._running: Future | None = None
         # a daemon: not even a policy that never answers keeps the program from ending
         self._thread = threading.Thread(target=self._answer, name="policy", daemon=True)
@@ -168,18 +175,8 @@ class PolicyWorker:
         """Stop its flight."""
         self.state = self.decision = None
 
-    def step(
-        self,
-        odometry: Odometry,
-        now: float,
-        slack: float,
-        imu: Imu | None,
-        images: Sequence[np.ndarray] = (),
-        others: Others | None = None,
-    ) -> bool:
-        """Call the policy if it is due within `slack` s. Returns whether it made a new decision. Errors are in
-        `problem`.
-        """
+    def step(self, sensed: Sensed, now: float, slack: float) -> bool:
+        """Call the policy if it is due. Returns whether it made a new decision. Errors are in `problem`."""
         state = self.state
         if state is None or now + slack < due(self.runtime, state):
             return False
@@ -188,7 +185,7 @@ class PolicyWorker:
             return False
         started = time.perf_counter()
         self._running = Future()
-        self._questions.put((self._running, (self.runtime, state, odometry, now, imu, images, others)))
+        self._questions.put((self._running, state, sensed, now))
         try:
             state, self.decision = self._running.result(self.timeout)
         except Late:
@@ -215,10 +212,9 @@ class PolicyWorker:
         with suppress(Exception):  # a question in flight will tell
             _try_out(self.runtime)
         while (question := self._questions.get()) is not None:
-            future, asked = question
+            future, state, s, now = question
             try:
-                *known, images, others = asked
-                future.set_result(act(*known, images=images, others=others))
+                future.set_result(act(self.runtime, state, s.odometry, now, s.imu, images=s.images, others=s.others))
             except Exception as error:  # told to whoever waits for it
                 future.set_exception(error)
 

@@ -170,7 +170,10 @@ def _nominal(task: type[TaskConfig], learner: type[AlgorithmConfig]) -> TrainCon
     """
     if not is_shipped(learner):
         return dataclasses.replace(task.recipe(learner.like), algo=learner())
-    return task.recipe(learner.name) if learner.name in ("ppo", "bptt") else _with_critic(task, learner.name)
+    if learner.exact and learner.name != "bptt":
+        return _with_critic(task, learner.name)
+    config = task.recipe(learner.name)
+    return config if isinstance(config.algo, learner) else dataclasses.replace(config, algo=learner())
 
 
 def _with_critic(task: type[TaskConfig], algo: str) -> TrainConfig:

@@ -76,7 +76,10 @@ class Route:
     def course_of(self, contract: Contract, shape: Shape) -> Course:
         """The course for a policy. If a task has several kinds of observation, the course uses that of this policy."""
         course = self.course(shape, 1 / contract.control_rate_hz)
-        options, memory = course.goal.config.showing([field.name for field in contract.observation]), course.memory
+        names, memory = [field.name for field in contract.observation], course.memory
+        options = dataclasses.replace(course.goal.config.showing(names), observes=None)
+        if any(field.name not in names for field in dataclasses.replace(course.goal, config=options).fields):
+            options = dataclasses.replace(options, observes=tuple(names))
         if course.goal.neighbours:
             options = dataclasses.replace(options, neighbours=contract.neighbours)
             memory = course.goal.among(memory, nobody(np.atleast_2d(course.start), contract.neighbours))
@@ -150,8 +153,8 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
         return usual_route(contract).course_of(contract, shape).goal.fields
     if not goal.observation:
         return goal.fields  # type: ignore[return-value]
-    options = TASKS.find(contract.task)().showing(names)
-    return tuple(field for field, _ in goal.observation if options.shows(field.name))
+    options = dataclasses.replace(TASKS.find(contract.task)().showing(names), observes=None)
+    return tuple(field for field, _ in goal.observation if options.shows(field.name) and field.name in names)
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:

@@ -126,19 +126,10 @@ def make_task(config: TaskConfig, shape: Shape, control_period: float, substeps:
         ValueError: when the options name something that does not exist or is broken; or when their `world` is not a
             task, naming its file and what it lacks.
     """
-    world = world_of(type(config))
+    world: Any = load(config.world) if isinstance(config.world, str) else config.world
     check_methods(world, METHODS)
     register_options(type(config))
     return world.of(config, shape, control_period, substeps)
-
-
-def world_of(options: type[TaskConfig]) -> Any:
-    """The class that simulates a task.
-
-    Raises:
-        ValueError: when `world` does not name an existing class.
-    """
-    return load(options.world) if isinstance(options.world, str) else options.world
 
 
 @cache

@@ -220,11 +220,5 @@ def open_fence(vehicle: Vehicle, reach: float) -> Fence:
     """A fence of a rehearsal that only ends what has gone astray: `reach` m in each direction, below the ground, too. A
     race dives so near to the ground that a guard at a floor would end good flights. What touches the ground is seen.
     """
-    return Fence(
-        low=(-reach, -reach, -reach), high=(reach, reach, reach), speed=20.0, tilt=3.1, braking=braking_of(vehicle)
-    )
-
-
-def braking_of(vehicle: Vehicle) -> float:
-    """The deceleration that a guard may count on, m/s^2: half of what full thrust has over the weight."""
-    return (vehicle.thrust_to_weight - 1) * GRAVITY / 2
+    braking = (vehicle.thrust_to_weight - 1) * GRAVITY / 2  # half of what full thrust has over the weight
+    return Fence(low=(-reach, -reach, -reach), high=(reach, reach, reach), speed=20.0, tilt=3.1, braking=braking)

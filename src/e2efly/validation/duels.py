@@ -20,7 +20,8 @@ from e2efly.policy.observation import PAST_ACTIONS
 from e2efly.simulation.device import prepare, wide_vectors
 from e2efly.tasks.race import RaceConfig
 from e2efly.tasks.race_duel import RaceDuelConfig
-from e2efly.validation.evaluation import SEED, act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import SEED, act_of
 
 LAPS = 3
 """Laps of a race on a closed track."""

@@ -70,7 +70,7 @@ class Truth:
     def between(self, begin: float, end: float) -> "Truth":
         """The part between two times, s."""
         rows = (self.time >= begin) & (self.time <= end)
-        return Truth(*(x[rows] for x in (self.time, self.position, self.velocity, self.quaternion, self.behind)))
+        return Truth(*(x[rows] for x in vars(self).values()))
 
     def every(self, period: float) -> "Truth":
         """The samples nearest to times `period` s apart, from the first sample on."""
@@ -78,7 +78,7 @@ class Truth:
             return self
         moments = np.arange(self.time[0], self.time[-1] + 1e-9, period)
         rows = np.unique(np.clip(np.searchsorted(self.time, moments), 0, len(self.time) - 1))
-        return Truth(*(x[rows] for x in (self.time, self.position, self.velocity, self.quaternion, self.behind)))
+        return Truth(*(x[rows] for x in vars(self).values()))
 
 
 @dataclass(frozen=True)

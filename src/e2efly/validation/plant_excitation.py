@@ -63,9 +63,6 @@ class Sensors:
     """Number of gaps of 20 to 100 ms in gyroscope, accelerometer and rotor speeds."""
 
 
-PERFECT = Sensors(*[0.0] * 9, gaps=0)
-
-
 def fly_excitation(
     plant: Plant,
     believed: Vehicle,

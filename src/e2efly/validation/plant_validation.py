@@ -19,7 +19,8 @@ from e2efly.policy.goal import Course
 from e2efly.policy.runtime import check
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.route import fields_of
-from e2efly.validation.evaluation import ROW, SEED, UNITS, Candidate, candidate, course_rows, fly_criteria
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import ROW, SEED, UNITS, course_rows, fly_criteria
 from e2efly.validation.fleet import FleetFlight, FleetMission, fly_all
 from e2efly.validation.gate_pose import GateCamera, GateFlight, track_of
 from e2efly.validation.log import SAMPLE, record_of

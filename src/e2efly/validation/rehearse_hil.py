@@ -22,7 +22,7 @@ from e2efly.flight.sight.shared import place
 from e2efly.policy.goal import Course
 from e2efly.tasks.route import Route, course_for, route_of
 from e2efly.validation.bridge_session import rehearsal_settings
-from e2efly.validation.evaluation import Candidate
+from e2efly.validation.candidate import Candidate
 from e2efly.validation.hil_lap import TOUCH, Heard, Lap, lap_of
 from e2efly.validation.mocap_process import DELAY_S
 from e2efly.validation.processes import (
@@ -232,7 +232,8 @@ class _Flight:
         self.room = Room(plan.found.vehicle, seed, stands, cores[0], inlet)
         stack.enter_context(self.room)
         link = None if plan.radio == 0.0 else self._radio(stack)
-        settings = rehearsal_settings(self._height(), REACH_IN_SIGHT, plan.fence)
+        height = float(self._first()[2] - plan.vehicle.feet_height)  # of the hover, above where the vehicle stood, m
+        settings = rehearsal_settings(height, REACH_IN_SIGHT, plan.fence)
         options = [*flags("flight", settings), *images, "--envelope.speed", "8"]
         options += [*flags("goal", drawn.route), *flies, *plan.options]
         log = folder / "flight.mcap"
@@ -254,10 +255,6 @@ class _Flight:
         course, (x, y) = self.drawn.course, self._first()[:2] + self.random.uniform(-0.2, 0.2, 2)
         yaw = self.random.uniform(-0.05, 0.05) + course.origin.yaw + (course.heading or 0.0)
         return float(x), float(y), float(yaw)
-
-    def _height(self) -> float:
-        """Height of the hover before the policy, above the place where the vehicle stood, m."""
-        return float(self._first()[2] - self.plan.vehicle.feet_height)
 
     def fly(self, kill: Victim | None) -> None:
         """Let the pilot fly, and kill one process if one is to be killed."""

@@ -24,11 +24,7 @@ from e2efly.validation.sitl import Sitl
 from e2efly.vehicles.gravity import GRAVITY
 from e2efly.vehicles.vehicle import Vehicle
 
-BLACKBOX = (
-    "set blackbox_device=VIRTUAL",
-    "set blackbox_sample_rate=1/8",
-    "set blackbox_high_resolution=ON",
-)
+BLACKBOX = ("set blackbox_device=VIRTUAL", "set blackbox_sample_rate=1/8", "set blackbox_high_resolution=ON")
 """Settings with which the firmware writes its blackbox into its folder, with a thousand frames per second."""
 LOST_CHANNEL = 13
 """AUX9, a channel of the receiver itself. It tells of a lost signal to firmware that does not detect it."""

@@ -111,9 +111,8 @@ def beside(world: World, task: Scene) -> World:
         ValueError: if an object of the task's world moves and the scene is of triangles, which cannot move.
     """
     if isinstance(world, Scene):
-        both = {
-            kind: join(*(s.solids[kind] for s in (world, task) if kind in s.solids)) for kind in _kinds(world, task)
-        }
+        kinds = sorted({*world.kinds, *task.kinds})
+        both = {kind: join(*(s.solids[kind] for s in (world, task) if kind in s.solids)) for kind in kinds}
         return dataclasses.replace(world, solids=both)
     for kind, solids in task.solids.items():
         if np.any(np.asarray(solids.moves)):
@@ -122,10 +121,6 @@ def beside(world: World, task: Scene) -> World:
             )
     things = parts(dataclasses.replace(task, ground=np.full_like(task.ground, -FAR)), 0)
     return world.beside(MeshScene.of(things)) if things else world
-
-
-def _kinds(*scenes: Scene) -> list[str]:
-    return sorted({kind for scene in scenes for kind in scene.kinds})
 
 
 @dataclass(frozen=True)

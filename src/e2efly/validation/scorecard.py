@@ -20,7 +20,8 @@ from e2efly.environment.episodes import summary, wilson
 from e2efly.environment.stress_rows import ALL, ROWS, rows_for
 from e2efly.simulation.device import processor
 from e2efly.validation import plant_stress
-from e2efly.validation.evaluation import Candidate, candidate, fly_criteria, with_changes
+from e2efly.validation.candidate import Candidate, candidate, with_changes
+from e2efly.validation.evaluation import fly_criteria
 from e2efly.validation.plants import find_plant
 from e2efly.validation.stress import fly_rows
 from e2efly.validation.stress_laws import LAWS
@@ -82,7 +83,7 @@ def entrant(
         baseline: the hover controller that flies in place of the policy, as in `evaluate`.
 
     Raises:
-        ValueError: as for `evaluation.candidate`; and for a family without one vehicle to fly.
+        ValueError: as for `candidate.candidate`; and for a family without one vehicle to fly.
     """
     found = candidate(file, vehicle, controller, baseline=baseline)
     if found.draws:

@@ -23,7 +23,8 @@ from e2efly.environment.episodes import Act, Episodes, EpisodesUnderWay, run_ste
 from e2efly.environment.stress_rows import ROWS, Draw, StressRow, check_seen, rows_for, with_longer_queue
 from e2efly.simulation.device import fast_compile, prepare, wide_vectors
 from e2efly.simulation.physics import RateLoop
-from e2efly.validation.evaluation import BATCH, SEED, Candidate, act_of, candidate
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import BATCH, SEED, act_of
 from e2efly.validation.law_step import BODY, LawMemory, LawStep, air_of, arrived, observed
 from e2efly.validation.stress_laws import LATEST, LAWS, LawSetting, StressLaw, steps_of
 from e2efly.vehicles.vehicle import Controller, Vehicle

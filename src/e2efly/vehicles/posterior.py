@@ -207,13 +207,10 @@ def read_correlation(file: dict[str, Any], where: str) -> tuple[list[str], np.nd
     except (TypeError, ValueError):
         matrix = np.zeros(0)
     good = matrix.shape == (len(names),) * 2 and np.isfinite(matrix).all()
-    if not (good and np.allclose(matrix, matrix.T) and np.allclose(np.diag(matrix), 1) and _is_positive(matrix)):
+    good = good and np.allclose(matrix, matrix.T) and np.allclose(np.diag(matrix), 1)
+    if not (good and np.linalg.eigvalsh(matrix).min() > 0):
         raise ValueError(
             f"{where}: correlation.value is {shown(table.get('value'))}; accepted: a symmetric, positive definite "
             f"matrix of {len(names)} rows with 1 on its diagonal"
         )
     return names, matrix
-
-
-def _is_positive(matrix: np.ndarray) -> bool:
-    return bool(np.linalg.eigvalsh(matrix).min() > 0)

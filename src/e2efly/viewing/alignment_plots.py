@@ -7,7 +7,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from e2efly.alignment.alignment import LEAD_S, Alignment, clearest
 from e2efly.alignment.replay import SIGNALS, Stretches, stretches, thrust_is_told
@@ -15,7 +14,7 @@ from e2efly.alignment.windows import REACH, STEP
 from e2efly.config.drawing import INK
 from e2efly.logs.recording import Record
 from e2efly.simulation.physics.rotation import yaw_pitch_roll
-from e2efly.viewing.style import BLUE, GREY, PALE, VERMILLION, figure, say
+from e2efly.viewing.style import BLUE, GREY, PALE, VERMILLION, figure, legend_of, say
 
 STEPPED = ("thrust (m/s²)", "roll rate (rad/s)", "pitch rate (rad/s)", "yaw rate (rad/s)")
 """Labels by channel of a command."""
@@ -54,12 +53,7 @@ def plot_steps(path: Path, alignment: Alignment, record: Record) -> None:
             if place > 2:
                 ax.set_xlabel("time since the step (ms)")
             _draw_step(ax, alignment, clearest(record, channel), channel)
-        _legend(fig)
-
-
-def _legend(fig: Figure) -> None:
-    handles, labels = fig.axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        legend_of(fig.axes[0], fig)
 
 
 def _draw_step(ax: Axes, alignment: Alignment, flown: Stretches, channel: int) -> None:
@@ -106,7 +100,7 @@ def plot_replay(path: Path, alignment: Alignment, record: Record) -> None:
             if axis == 2:
                 ax.set_xlabel("time in the flight (s)")
             _draw_stretches(ax, flown, (old, new), stream, axis)
-        _legend(fig)
+        legend_of(fig.axes[0], fig)
 
 
 def _liveliest(record: Record) -> Stretches:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from e2efly.validation.closed_loop import ClosedLoop
 from e2efly.viewing.alignment_plots import AFTER, BEFORE, MEASURED
-from e2efly.viewing.style import figure, say
+from e2efly.viewing.style import figure, legend_of, say
 
 SHOWN_S = 6.0
 """Longest time that is shown, s."""
@@ -49,8 +49,7 @@ def plot_closed_loop(path: Path, loop: ClosedLoop) -> None:
         for ax in axes[2]:
             ax.set_xlabel("time (s)")
             ax.set_xlim(0, min(SHOWN_S, float(seen[-1, 0])))
-        handles, labels = axes[1, 1].get_legend_handles_labels()
-        fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        legend_of(axes[1, 1], fig)
 
 
 def _draw_commands(ax: Axes, loop: ClosedLoop, channel: int) -> None:

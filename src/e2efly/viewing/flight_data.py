@@ -51,6 +51,11 @@ def intervals(log: FlightLog) -> list[Interval]:
     return found if found[0].end > found[0].start else found[1:]
 
 
+def in_flight(log: FlightLog) -> list[Interval]:
+    """The modes in which commands are followed."""
+    return [i for i in intervals(log) if i.mode.upper() not in GROUNDED]
+
+
 def gyro(log: FlightLog) -> tuple[np.ndarray, np.ndarray, str]:
     """Measured body rate: times (n,) s, values (n, 3) rad/s, and the source. Without an IMU: the odometry."""
     for source, field in (("imu", "gyro"), ("odometry", "body_rate")):
@@ -66,7 +71,7 @@ def responses(log: FlightLog) -> dict[str, StepResponse]:
     commands = log["command"]
     asked = commands.numbers("body_rate", 3)
     time, rate, _ = gyro(log)
-    flown = [(i.start, i.end) for i in intervals(log) if i.mode.upper() not in GROUNDED] or None
+    flown = [(i.start, i.end) for i in in_flight(log)] or None
     return {axis: step_response(commands.time, asked[:, i], time, rate[:, i], flown) for i, axis in enumerate(AXES)}
 
 
@@ -77,7 +82,7 @@ def align_command(log: FlightLog, found: Mapping[str, StepResponse]) -> str | No
         log: the flight.
         found: the step responses of its axes.
     """
-    flown = sum(i.end - i.start for i in intervals(log) if i.mode.upper() not in GROUNDED)
+    flown = sum(i.end - i.start for i in in_flight(log))
     felt = np.isfinite(log["imu"].numbers("gyro", 3)).any()
     if not felt or flown < ALIGNED_S or all(r.excitation < EXCITATION for r in found.values()):
         return None
@@ -138,11 +143,6 @@ def _least(changes: Series, mine: np.ndarray) -> float:
     return float(changes.numbers("room")[mine].min())
 
 
-def tilt(quaternion: np.ndarray) -> np.ndarray:
-    """Angle between body z and up, rad, for quaternions (n, 4)."""
-    return Quat.of(quaternion).tilt()
-
-
 def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogClock | None = None) -> dict[str, Any]:
     """The flight in numbers, SI units. None where nothing is known. It can be written as JSON."""
     motion, timing, link, battery = log["odometry"], log["timing"], log["link"], log["battery"]
@@ -160,7 +160,7 @@ def summary(log: FlightLog, blackbox: Blackbox | None = None, alignment: LogCloc
         "modes": [{"mode": i.mode, "start_s": i.start, "end_s": i.end, "reasons": list(i.reasons)} for i in changes],
         "error_m": _errors(log, changes),
         "speed_max_m_s": _largest(speed),
-        "tilt_max_rad": _largest(tilt(motion.numbers("quaternion", 4))),
+        "tilt_max_rad": _largest(Quat.of(motion.numbers("quaternion", 4)).tilt()),
         "odometry_age_s": _spread(motion.numbers("age")),
         "rate_response": {axis: response_numbers(r) for axis, r in found.items()},
         "align": align_command(log, found),

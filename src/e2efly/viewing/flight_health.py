@@ -10,7 +10,7 @@ from e2efly.config.drawing import INK, ORANGE
 from e2efly.logs.blackbox import Blackbox, LogClock
 from e2efly.logs.flight_log import FlightLog
 from e2efly.viewing.flight_axes import XYZ, bands, empty, liveliest, note
-from e2efly.viewing.flight_data import AXES, GROUNDED, gyro, intervals
+from e2efly.viewing.flight_data import AXES, gyro, in_flight, intervals
 from e2efly.viewing.style import BLUE, CYCLE, GREEN, GREY, PURPLE, SKY, VERMILLION, figure, say
 
 LAG = 0.04
@@ -143,7 +143,7 @@ def _throttle_points(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
     """Throttle and the specific force `LAG` later, in flight, in order of time."""
     sticks, imu = log["sticks"], log["imu"]
     throttle, force = sticks.numbers("throttle"), imu.numbers("specific_force", 3)[:, 2]
-    flown = [i for i in intervals(log) if i.mode.upper() not in GROUNDED] or intervals(log)
+    flown = in_flight(log) or intervals(log)
     inside = np.zeros(len(imu), bool)
     for i in flown:
         inside |= (imu.time - LAG >= i.start) & (imu.time <= i.end)

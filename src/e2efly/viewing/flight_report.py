@@ -11,11 +11,12 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from e2efly.config.drawing import INK
+from e2efly.control import Quat
 from e2efly.logs.flight_log import FlightLog
 from e2efly.viewing.flight_axes import XYZ, bands, colors, empty, liveliest, mode_handles, note, stepped_in_marks
-from e2efly.viewing.flight_data import AXES, Interval, errors, gyro, intervals, tilt
+from e2efly.viewing.flight_data import AXES, Interval, errors, gyro, intervals
 from e2efly.viewing.rate_response import StepResponse
-from e2efly.viewing.style import GREY, PALE, figure, say
+from e2efly.viewing.style import GREY, PALE, figure, in_space, say
 
 _CHANGES = 15  # largest number of mode changes that are listed, the first mode included
 _DASHED: dict[str, Any] = {"linewidth": 1.1, "linestyle": (0, (4, 2))}
@@ -50,14 +51,8 @@ def plot_tracks(log: FlightLog, path: str | Path) -> None:
             plan.add_collection(LineCollection(list(segments[..., :2]), colors=color[mode], linewidths=1.5, zorder=3))
         solid.plot(*setpoint.T, color=INK, zorder=2, **_DASHED)
         plan.plot(*setpoint.T[:2], color=INK, zorder=2, **_DASHED)
-        for ax, name in ((solid.xaxis, "x (m)"), (solid.yaxis, "y (m)"), (solid.zaxis, "z (m)")):
-            ax.set_label_text(name)
-            ax.set_major_locator(MaxNLocator(3 if ax is solid.zaxis else 5, steps=[1, 2, 5, 10]))
-            ax.labelpad = 0
-            ax.set_pane_color((1, 1, 1, 0))
-            ax.line.set_color(GREY)
+        in_space(solid, (5, 5, 3))
         solid.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        solid.tick_params(pad=1)
         solid.set_box_aspect(high - low, zoom=1.04)
         solid.view_init(elev=26, azim=-58)
         plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x (m)", ylabel="y (m)", title="From above")
@@ -86,7 +81,7 @@ def plot_motion(log: FlightLog, path: str | Path) -> None:
             place.plot(commands.time, setpoint[:, i], color=c, drawstyle="steps-post", **_DASHED)
             speed.plot(motion.time, velocity[:, i], color=c, label=name)
         place.plot([], [], color=GREY, label="setpoint", **_DASHED)
-        angle.plot(motion.time, np.degrees(tilt(motion.numbers("quaternion", 4))), color=INK)
+        angle.plot(motion.time, np.degrees(Quat.of(motion.numbers("quaternion", 4)).tilt()), color=INK)
         error.plot(*errors(log), color=INK)
         labels = ("position (m)", "velocity (m/s)", "tilt (deg)", "distance to\nsetpoint (m)")
         for ax, label in zip(axes, labels, strict=True):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from e2efly.alignment.open_loop import HOLD, HOVER, OWN_VEHICLE, STREAMS, VEHICLE
-from e2efly.viewing.style import BLUE, GREEN, GREY, VERMILLION, figure, say
+from e2efly.viewing.style import BLUE, GREEN, GREY, VERMILLION, figure, legend_of, say
 
 COLOURS = {HOLD: GREY, HOVER: VERMILLION, VEHICLE: BLUE, OWN_VEHICLE: GREEN}
 
@@ -27,7 +27,6 @@ def plot_forecasts(
             ax.set_xlabel("time ahead (s)")
             ax.set_ylim(bottom=0)
         if errors:
-            handles, labels = max((ax.get_legend_handles_labels() for ax in fig.axes), key=lambda x: len(x[1]))
-            fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+            legend_of(max(fig.axes, key=lambda ax: len(ax.get_legend_handles_labels()[1])), fig)
         else:
             say(fig.add_subplot(), "nothing that is predicted was measured")

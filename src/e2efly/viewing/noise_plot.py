@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import welch
 
 from e2efly.alignment.sensor_noise import MEASURED, SensorNoise
-from e2efly.viewing.style import CYCLE, INK, figure
+from e2efly.viewing.style import CYCLE, INK, figure, legend_of
 
 POINTS = 256
 """Samples of each piece of the log whose spectra are averaged."""
@@ -40,5 +40,4 @@ def plot_noise(path: Path, noises: Sequence[SensorNoise], trained: Mapping[str, 
             ax.set_title(noise.name.replace("_", " "))
             ax.set_ylabel(f"{MEASURED[noise.name]}/√Hz".replace("^2", "²"))
             ax.set_xlabel("frequency (Hz)")
-        handles, labels = fig.axes[0].get_legend_handles_labels()
-        fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        legend_of(fig.axes[0], fig)

@@ -1,7 +1,6 @@
 """The figure of the analysis of a rate loop: step response, spectra of the gyroscope, and the loop's terms, by axis."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,12 +35,9 @@ def plot_pid(found: PidAnalysis, path: str | Path, of: str) -> None:
         labels = ("rate / rate commanded", "gyro (rad/s/√Hz)", "mean motor output", "term (share of full range)")
         for ax, label in zip(axes[:, 0], labels, strict=True):
             ax.set_ylabel(label)
-        handles = {label: line for ax in (axes[1, 0], axes[3, 0]) for line, label in zip(*_legend(ax), strict=True)}
+        told = [ax.get_legend_handles_labels() for ax in (axes[1, 0], axes[3, 0])]
+        handles = {label: line for each in told for line, label in zip(*each, strict=True)}
         fig.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=max(len(handles), 1))
-
-
-def _legend(ax: Axes) -> tuple[list[Any], list[Any]]:
-    return ax.get_legend_handles_labels()
 
 
 def _draw_spectrum(ax: Axes, found: PidAnalysis, axis: int) -> None:

@@ -287,11 +287,7 @@ def _finite(values: Any, field: str) -> np.ndarray:
 
 
 def _distributions(
-    ax: Axes,
-    values: Mapping[str, np.ndarray],
-    lines: Mapping[str, float],
-    colors: Mapping[str, str],
-    logarithmic: bool,
+    ax: Axes, values: Mapping[str, np.ndarray], lines: Mapping[str, float], colors: Mapping[str, str], logarithmic: bool
 ) -> None:
     """Draw empirical distribution functions over pale histograms, on a logarithmic axis if allowed and useful."""
     ax.set_ylim(0, 104)

@@ -24,7 +24,7 @@ from e2efly.config.drawing import INK, Face, Line, Mark, Thing
 from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.viewing.flights import Flights
 from e2efly.viewing.objects import scene
-from e2efly.viewing.style import FAILURE, GREY, MARK, PALE, SPEED, START, figure
+from e2efly.viewing.style import FAILURE, MARK, PALE, SPEED, START, figure, in_space
 from e2efly.viewing.worlds import draw_plan, draw_space
 
 Corner = Float[np.ndarray, "3"]
@@ -111,14 +111,10 @@ def _is_flat(size: Corner) -> bool:
     return bool(size[2] < 0.4 * np.max(size[:2]))
 
 
-def _segments(points: np.ndarray) -> np.ndarray:
-    """(m, d) points as (m - 1, 2, d) pairs."""
-    return np.stack([points[:-1], points[1:]], axis=1)
-
-
 def _paths(flights: Flights) -> tuple[np.ndarray, np.ndarray]:
     """The segments (s, 2, 3) of all flights up to their ends, and the speed on each segment."""
-    segments = [_segments(flights.position[:k, i]) for i, k in enumerate(flights.length)]
+    paths = [flights.position[:k, i] for i, k in enumerate(flights.length)]
+    segments = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
     speeds = [(flights.speed[: max(k - 1, 0), i] + flights.speed[1:k, i]) / 2 for i, k in enumerate(flights.length)]
     return np.concatenate([np.zeros((0, 2, 3)), *segments]), np.concatenate([np.zeros(0), *speeds])
 
@@ -160,13 +156,7 @@ def draw_flights(ax: Solid, flights: Flights, things: list[Thing], low: Corner, 
     ax.set_proj_type("persp", focal_length=1.4)
     flat = _is_flat(high - low)
     ax.view_init(elev=34 if flat else 24, azim=-58)
-    for axis, label, few in ((ax.xaxis, "x (m)", 6), (ax.yaxis, "y (m)", 6), (ax.zaxis, "z (m)", 3 if flat else 6)):
-        axis.set_label_text(label)
-        axis.set_major_locator(MaxNLocator(few, steps=[1, 2, 5, 10]))
-        axis.set_pane_color((1, 1, 1, 0))
-        axis.line.set_color(GREY)
-        axis.labelpad = 0
-    ax.tick_params(pad=1)
+    in_space(ax, (6, 6, 3 if flat else 6))
 
 
 def draw_flat(ax: Axes, things: list[Thing], axes: tuple[int, int]) -> None:

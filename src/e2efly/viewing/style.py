@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogFormatter, LogFormatterMathtext
+from matplotlib.ticker import FormatStrFormatter, LogFormatter, LogFormatterMathtext, MaxNLocator
 
 from e2efly.config.drawing import INK, ORANGE
 from e2efly.config.storage import write_atomically
@@ -82,6 +82,23 @@ def figure(
         picture = io.BytesIO()
         fig.savefig(picture, format="png")
         write_atomically(Path(path), picture.getvalue())
+
+
+def in_space(ax: Any, ticks: tuple[int, int, int]) -> None:
+    """Give three-dimensional axes labels in metres, so many ticks at most, and clear walls."""
+    for axis, name, most in zip((ax.xaxis, ax.yaxis, ax.zaxis), "xyz", ticks, strict=True):
+        axis.set_label_text(f"{name} (m)")
+        axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+        axis.set_pane_color((1, 1, 1, 0))
+        axis.line.set_color(GREY)
+        axis.labelpad = 0
+    ax.tick_params(pad=1)
+
+
+def legend_of(ax: Axes, fig: Figure) -> None:
+    """Explain, below all plots of a figure, what one of them shows."""
+    handles, labels = ax.get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
 
 
 def _label_decades(axis: Axis) -> None:

@@ -23,7 +23,8 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.random_inputs import random_images, random_observations
 from e2efly.policy.zoo import contents, policy_file
-from e2efly.validation.evaluation import act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import act_of
 from tests.learning.test_export_images import CONVOLVED, DEPTH, MASK, POOLED, RGB, exported
 from tests.policy.c_export.compiled import STRICT, Compiled, build, compiled, compiler
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from e2efly.config import NoiseConfig
+from e2efly.control import Quat
 from e2efly.environment import random_key
 from e2efly.simulation.physics import State, rotation
 from e2efly.simulation.sensors.noise import add_noise
@@ -22,7 +23,7 @@ def state() -> State:
 
 def test_standard_deviations(state: State) -> None:
     seen = add_noise(NOISE, random_key(0), state)
-    turn = 2 * rotation.multiply(rotation.conjugate(state.quaternion), seen.quaternion)[:, 1:]
+    turn = 2 * Quat.of(state.quaternion).conjugate().compose(Quat.of(seen.quaternion)).stack()[:, 1:]
     for error, std in (
         (seen.position - state.position, 0.02),
         (seen.velocity - state.velocity, 0.1),

@@ -2,15 +2,9 @@
 
 import numpy as np
 
+from e2efly.control.vectors import rotate
 from e2efly.vehicles.loading import load_vehicle
-from e2efly.viewing.watch.triangles import mesh_of, quadrotor, spun, turned
-
-
-def test_a_vector_is_turned_as_by_the_rotation_matrix() -> None:
-    half = np.deg2rad(30) / 2
-    about_z = np.array([[np.cos(half), 0.0, 0.0, np.sin(half)]])
-    found = turned(about_z, np.array([[1.0, 0.0, 2.0]]))
-    assert np.allclose(found, [[np.cos(2 * half), np.sin(2 * half), 2.0]])
+from e2efly.viewing.watch.triangles import mesh_of, quadrotor, spun
 
 
 def test_rotors_are_where_the_vehicles_file_has_them_whatever_the_attitude() -> None:
@@ -32,8 +26,8 @@ def test_a_spun_rotor_turns_about_the_bodys_axis() -> None:
     _, still = spun(shape, np.zeros((1, 3)), tilted, np.zeros((1, 4)))
     _, quarter = spun(shape, np.zeros((1, 3)), tilted, np.full((1, 4), np.pi / 2))
     axis, blade = np.tile([0.0, 0.0, 1.0], (4, 1)), np.tile([1.0, 0.0, 0.0], (4, 1))
-    assert np.allclose(turned(still, axis), turned(quarter, axis))
-    assert np.allclose(turned(quarter, blade), turned(np.repeat(tilted, 4, 0), np.tile([0.0, 1.0, 0.0], (4, 1))))
+    assert np.allclose(rotate(still, axis), rotate(quarter, axis))
+    assert np.allclose(rotate(quarter, blade), rotate(np.repeat(tilted, 4, 0), np.tile([0.0, 1.0, 0.0], (4, 1))))
 
 
 def test_rotors_that_push_the_body_one_way_turn_the_other() -> None:

@@ -8,7 +8,8 @@ import pytest
 import viser
 
 from e2efly.environment import Env, random_key
-from e2efly.validation.evaluation import act_of, candidate
+from e2efly.validation.candidate import candidate
+from e2efly.validation.evaluation import act_of
 from e2efly.vehicles.loading import load_vehicle
 from e2efly.viewing.watch.simulation import Hands, Simulation, held, under
 from e2efly.viewing.watch.viewer import Viewer

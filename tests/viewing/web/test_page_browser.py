@@ -19,7 +19,8 @@ from e2efly.policy.zoo import FOLDER
 from e2efly.simulation.physics import INTEGRATORS
 from e2efly.tasks import TASKS
 from e2efly.tasks.hover import HoverConfig
-from e2efly.validation.evaluation import SEED, Candidate, act_of, candidate
+from e2efly.validation.candidate import Candidate, candidate
+from e2efly.validation.evaluation import SEED, act_of
 from e2efly.vehicles.loading import vehicle_file
 from e2efly.vehicles.vehicle import terms
 from e2efly.viewing.watch.simulation import Hands, under
@@ -192,7 +193,7 @@ def test_every_world_of_a_task_is_tested() -> None:
 
 STATED = (
     "avoid", "dodge", "hall", "hover_payload", "land_visual", "race_clutter", "race_speed", "avoid_together",
-    "race_duel", "swap",
+    "race_duel", "swap", "race_eyes",
 )  # fmt: skip
 """Tasks of cameras and of loads, whose worlds fly without them, too, of random worlds, and of several vehicles."""
 

@@ -319,10 +319,5 @@ def ask(client: Client, code: int, timeout_s: float = 1.0, payload: bytes = b"",
     raise TimeoutError(f"MSP {_name(code)}: no answer within {timeout_s:g} s ({reason})")
 
 
-def tell(client: Client, frame: MspFrame, timeout_s: float = 1.0) -> None:
-    """Send a frame that sets something, and wait until the controller has accepted it; see `ask`."""
-    ask(client, frame.code, timeout_s, frame.payload)
-
-
 def _name(code: int) -> str:
     return f"{MESSAGES[code].__name__} ({code})" if code in MESSAGES else str(code)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from e2efly.flight.attitude import Attitude
+from e2efly.flight.attitude import Attitude, level
 from e2efly.flight.betaflight.messages import RawImu
 from e2efly.flight.pilot import touch
 from e2efly.flight.pilot.touch import LAGS, Touch
@@ -225,15 +225,6 @@ def sent(before: Descent, thrust: float, now: float) -> Descent:
     """The descent after the controller got, or held, a thrust, m/s^2, at `now`, s."""
     kept = tuple((at, was) for at, was in before.thrusts if at > now - KEPT_S)
     return replace(before, thrusts=(*(kept or before.thrusts[-1:]), (now, thrust)))
-
-
-def level(attitude: Attitude, vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A vector of the body, FLU, in level axes that point along the heading."""
-    x, y, z = vector
-    cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
-    cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
-    lifted = sr * y + cr * z
-    return cp * x + sp * lifted, cr * y - sr * z, cp * lifted - sp * x
 
 
 def between(xs: Sequence[float], ys: Sequence[float], x: float) -> float:

@@ -5,7 +5,6 @@ evaluated again at every control step, until the next command comes or the time-
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,8 +17,8 @@ from e2efly.flight.pilot.hover import controlled, flight_gains, rates_of
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.images import Image
 from e2efly.policy.odometry import Odometry, tilt_of, yaw_of
-from e2efly.policy.others import Others
-from e2efly.policy.runtime import Decision, Envelope, Imu, beyond
+from e2efly.policy.runtime import Decision, Envelope, beyond
+from e2efly.policy.worker import Sensed
 from e2efly.vehicles.vehicle import Vehicle
 
 NAME = "commander"
@@ -143,22 +142,13 @@ class Commander:
         """Stop flying."""
         self.state = self.decision = None
 
-    def step(
-        self,
-        odometry: Odometry,
-        now: float,
-        slack: float,
-        imu: Imu | None,
-        images: Sequence[np.ndarray] = (),
-        others: Others | None = None,
-    ) -> bool:
+    def step(self, sensed: Sensed, now: float, slack: float) -> bool:
         """Convert the newest command to collective thrust and body rates. Returns whether a message has come since the
         last step.
 
         If there is no command to fly by, `problem` says why.
         """
-        del slack, imu, images, others
-        command, before = self.stream.command, self.state
+        odometry, command, before = sensed.odometry, self.stream.command, self.state
         if before is None:
             return False
         self.problem = silence(self.stream, now, self.timeout)

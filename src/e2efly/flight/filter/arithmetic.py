@@ -7,8 +7,6 @@ NumPy takes about a microsecond for a function of a single number. The standard 
 import math
 from typing import Any
 
-import numpy as np
-
 Number = Any
 """A float, or an array of the batch's shape."""
 
@@ -38,11 +36,6 @@ class Scalars:
 
 
 SCALARS = Scalars()
-
-
-def library(sample: Number) -> Any:
-    """The functions for such numbers: `SCALARS` for floats, NumPy for arrays."""
-    return np if isinstance(sample, np.ndarray) else SCALARS
 
 
 def clip(xp: Any, x: Number, low: Number, high: Number) -> Number:

@@ -2,7 +2,7 @@
 
 The path is computed in the plane in which the thrust turns. There, the rate loop, the mixer and the rotors' lag give
 one angle and one thrust over time, both with the vehicle's own numbers. The effect of the thrust on the velocity
-follows by summation. After `turn.TURN` s the thrust points in the braking direction, and the rest of the path is in
+follows by summation. After `turn.STEPS` the thrust points in the braking direction, and the rest of the path is in
 closed form.
 """
 

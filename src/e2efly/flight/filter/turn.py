@@ -8,8 +8,6 @@ STEPS = (0.02, 0.03, 0.04, 0.05, 0.07, 0.09, 0.1)
 """Steps of the turn, s. They are shorter at the beginning, where the turn is fastest."""
 SEEN = (1, 3, 4, 5, 6)
 """Indices of the steps after which the position is compared with the limits."""
-TURN = sum(STEPS)
-"""Duration of the turn, s."""
 
 
 class TurnStep(NamedTuple):

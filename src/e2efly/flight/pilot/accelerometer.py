@@ -5,12 +5,11 @@ measures is gravity plus the change of velocity.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from e2efly.flight.attitude import Attitude
+from e2efly.flight.attitude import Attitude, level
 from e2efly.vehicles.gravity import GRAVITY
 
 COUNTS = (200.0, 9000.0)
@@ -70,7 +69,7 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
     """Learn from a measurement in flight. `force` is (3,) specific force, body FLU, m/s^2, with the scale at rest.
     `climb` is the vertical velocity of the newest pose, m/s, and `dt` the time since the previous measurement, s.
     """
-    up = float(level(attitude, force)[2])
+    up = level(attitude, force)[2]
     wait = CALM_S if abs(up * before.value - GRAVITY) > CALM else before.wait - dt
     if wait > 0:
         return replace(before, wait=wait, climb=None)
@@ -85,12 +84,3 @@ def learn(before: Scale, attitude: Attitude, force: np.ndarray, climb: float, dt
         up,
         climb=climb,
     )
-
-
-def level(attitude: Attitude, vector: Sequence[float] | np.ndarray) -> np.ndarray:
-    """(3,) a vector of the body, FLU, expressed in level axes that point along the heading."""
-    fx, fy, fz = (float(v) for v in vector)
-    cr, sr = math.cos(attitude.roll), math.sin(attitude.roll)
-    cp, sp = math.cos(attitude.pitch), math.sin(attitude.pitch)
-    lifted = sr * fy + cr * fz
-    return np.array([cp * fx + sp * lifted, cr * fy - sr * fz, cp * lifted - sp * fx])

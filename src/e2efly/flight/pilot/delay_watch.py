@@ -61,8 +61,6 @@ class MeasuredDelay:
     """Time from the motion to the time stamp that the odometry gives for it, s."""
     deviation: float
     """Standard deviation of `seconds`, estimated from the remaining differences of the two motions, s."""
-    likeness: float
-    """Likeness of the two motions at this delay, at most 1."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ def delay_of(watch: DelayWatch) -> MeasuredDelay | None:
     deviation = math.sqrt(alike * float((left**2).mean()) / float((slope**2).sum())) / max(gain, 1e-9)
     if deviation > UNSURE_S:
         return None
-    return MeasuredDelay(LATEST - GRID_S * (best + float(off)), deviation, float(likeness[best]))
+    return MeasuredDelay(LATEST - GRID_S * (best + float(off)), deviation)
 
 
 def delay_problem(delay: MeasuredDelay | None, accepted: float) -> str | None:

@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from e2efly.flight.attitude import Attitude
+from e2efly.flight.attitude import Attitude, attitude_of
 from e2efly.flight.pilot import inertial
 from e2efly.flight.pilot.delay_watch import DelayWatch, MeasuredDelay, delay_of, delay_problem, felt, turned
 from e2efly.flight.pilot.flight_state import GROUNDED, Flight, Mode
 from e2efly.flight.pilot.heading_watch import HeadingWatch, watched
-from e2efly.flight.pilot.hover import LIFTED, roll_pitch
+from e2efly.flight.pilot.hover import LIFTED
 from e2efly.flight.pilot.inertial import Inertial, Measurement
 from e2efly.flight.pilot.lag_watch import LagWatch, MeasuredLag, lags_of, moved
 from e2efly.flight.pose.conditions import Checks
@@ -85,8 +85,8 @@ class StateEstimate:
         """
         if attitude is None or self.odometry is None:
             return None
-        roll, pitch = roll_pitch(self.odometry.quaternion)
-        return max(abs(math.remainder(attitude.roll - roll, math.tau)), abs(attitude.pitch - pitch))
+        posed = attitude_of(*self.odometry.quaternion.tolist())
+        return max(abs(math.remainder(attitude.roll - posed.roll, math.tau)), abs(attitude.pitch - posed.pitch))
 
     def accelerometer_problem(self, mode: Mode) -> str | None:
         """Why the accelerometer must not be used for flight. None: it may. A problem found in flight lasts until the

@@ -103,10 +103,3 @@ def blind_time(height: float, climb: float = 0.0) -> float:
     top = max(height, 0.0) + up**2 / (2 * SINK_ACCELERATION)
     sinking = (math.sqrt(SLOWEST_SINK**2 + 2 * SLOWEST_FASTER * top) - SLOWEST_SINK) / SLOWEST_FASTER
     return 1.8 + up / SINK_ACCELERATION + sinking
-
-
-def roll_pitch(quaternion: np.ndarray) -> tuple[float, float]:
-    """Roll and pitch, rad, of R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    w, x, y, z = (float(q) for q in quaternion)
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), pitch

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from e2efly.flight.attitude import Attitude
-from e2efly.flight.pilot.accelerometer import level
+from e2efly.flight.attitude import Attitude, level
 from e2efly.flight.pose.tracking import rotation_between
 from e2efly.policy.odometry import Odometry, yaw_of
 from e2efly.vehicles.gravity import GRAVITY

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from e2efly.control import Ctbr, Vec3
-from e2efly.flight.attitude import Attitude, turned
-from e2efly.flight.pilot.accelerometer import level
+from e2efly.flight.attitude import Attitude, level, turned
 from e2efly.flight.pilot.hover import LEVEL_GAIN, LEVEL_RATE, SINK_ACCELERATION, SINK_FASTER, SINK_SPEED
 from e2efly.policy.odometry import Odometry, yaw_of
 from e2efly.vehicles.gravity import GRAVITY
@@ -160,7 +159,7 @@ def reckon(
     since = before.since if attitude is not None or force is not None else before.since + dt
     attitude = attitude or turned(before.attitude or Attitude(0.0, 0.0, 0.0), rate, dt)
     upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
-    ahead, aside, above = (float(a) for a in level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY)))
+    ahead, aside, above = level(attitude, force or (0.0, 0.0, thrust[0] if thrust else GRAVITY))
     lift, doubt = (above, 0.0) if thrust is None else (thrust[0] * upright, thrust[1])
     forward, left, up = before.velocity
     if before.attitude is not None:

@@ -68,11 +68,7 @@ def run(module: str, function: str) -> Any:
     return started
 
 
-KINDS = {
-    "tcp": run("give_tcp", "serve"),
-    "ros1": run("give_ros", "give_ros1"),
-    "ros2": run("give_ros", "give_ros2"),
-}
+KINDS = {"tcp": run("give_tcp", "serve"), "ros1": run("give_ros", "give_ros1"), "ros2": run("give_ros", "give_ros2")}
 
 if __name__ == "__main__":
     importlib.import_module("speech").main(KINDS, sys.argv[1:])

@@ -1,13 +1,12 @@
 """What a policy's network receives, shown to people: as a picture in the terminal, and as a PNG."""
 
-import struct
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.text import Text
 
+from e2efly.flight.scripts.record import png
 from e2efly.policy.images import Image
 
 HOLE = (90, 0, 60)
@@ -69,24 +68,12 @@ def blocks(pixels: np.ndarray, columns: int = COLUMNS) -> Text:
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write a picture, enlarged (ISO/IEC 15948: 8 bits, colour type 2, no filter). The folder of the file is created.
-    `pixels` is (h, w, 3) uint8.
+    """Write a picture, enlarged. The folder of the file is created. `pixels` is (h, w, 3) uint8.
 
     Raises:
         OSError: if it cannot be written.
     """
     times = max(PIXELS // pixels.shape[1], 1)
     large = pixels.repeat(times, axis=0).repeat(times, axis=1)
-    height, width = large.shape[:2]
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), large.reshape(height, -1)], axis=1)  # 0: no filter
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0))
-        + chunk(b"IDAT", zlib.compress(rows.tobytes()))
-        + chunk(b"IEND", b"")
-    )
+    path.write_bytes(png(large.tobytes(), large.shape[0], large.shape[1], 3, 8))

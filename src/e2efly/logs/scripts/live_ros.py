@@ -112,8 +112,7 @@ class Ros2(Topics):
             return None
         durability = self._qos.DurabilityPolicy
         profile = self._qos.QoSProfile(
-            depth=1 if latched else QUEUE,
-            durability=durability.TRANSIENT_LOCAL if latched else durability.VOLATILE,
+            depth=1 if latched else QUEUE, durability=durability.TRANSIENT_LOCAL if latched else durability.VOLATILE
         )
         return self._node.create_publisher(known, topic, profile)
 

@@ -168,11 +168,7 @@ def rotor_momentum_torque(
 
 
 def accelerations(
-    plant: Airframe,
-    parts: Parts,
-    wind: Vec3 | None,
-    rotor_acceleration: Rotors | None = None,
-    pull: Vec3 | None = None,
+    plant: Airframe, parts: Parts, wind: Vec3 | None, rotor_acceleration: Rotors | None = None, pull: Vec3 | None = None
 ) -> tuple[Vec3, Vec3]:
     """Acceleration of the centre of mass in the world, m/s^2, and angular acceleration about the body axes, rad/s^2.
 

@@ -41,13 +41,7 @@ def control_law(mode: CommandMode) -> Law:
 
 
 def remembered(
-    mode: CommandMode,
-    vehicle: Vehicle,
-    memory: RateLoop,
-    begin: Parts,
-    now: Parts,
-    command: Command,
-    time: float,
+    mode: CommandMode, vehicle: Vehicle, memory: RateLoop, begin: Parts, now: Parts, command: Command, time: float
 ) -> RateLoop:
     """What the rate loop remembers at a state that is reached `time` seconds after `begin`, where it was `memory`.
 

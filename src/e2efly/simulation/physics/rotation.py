@@ -14,11 +14,6 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     return Quat.of(a).compose(Quat.of(b)).stack()
 
 
-def conjugate(q: Quaternion) -> Quaternion:
-    """The inverse turn of a unit quaternion."""
-    return Quat.of(q).conjugate().stack()
-
-
 def normalize(q: Quaternion) -> Quaternion:
     """Scale to unit length."""
     return Quat.of(q).normalized().stack()

@@ -168,10 +168,7 @@ def depth(seen: TileSight, kinds: Kinds, tile: Array, d: Float[Array, "3 r"]) ->
     """Depth of the nearest hits."""
     following = seen.following[tile]
     return over(
-        kinds,
-        lambda i: following[i + 1],
-        lambda kind, i, t: jnp.minimum(t, entered(kind, seen, i, d)),
-        ground(seen, d),
+        kinds, lambda i: following[i + 1], lambda kind, i, t: jnp.minimum(t, entered(kind, seen, i, d)), ground(seen, d)
     )
 
 

@@ -19,9 +19,7 @@ class AvoidTogetherConfig(AvoidConfig):
     route: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidRoute"
     paper: ClassVar[Paper | None] = None
 
-    robust: ClassVar = {
-        "bptt": dataclasses.replace(AvoidConfig.robust["bptt"], steps=2_000_000, start_from="avoid"),
-    }
+    robust: ClassVar = {"bptt": dataclasses.replace(AvoidConfig.robust["bptt"], steps=2_000_000, start_from="avoid")}
 
     agents: int = number(4, low=2, high=16, sets_shapes=True)
     """Number of vehicles in a forest (sets shapes)."""

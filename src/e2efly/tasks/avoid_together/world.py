@@ -81,12 +81,7 @@ class AvoidTogether(AvoidTogetherGoal, Avoid):
         return Scene.of({"cylinder": memory.trees, "sphere": others}, memory.speed.shape[0])
 
     def advance(
-        self,
-        memory: Any,
-        before: State,
-        after: State,
-        time: Float[jax.Array, " n"],
-        timed_out: Bool[jax.Array, " n"],
+        self, memory: Any, before: State, after: State, time: Float[jax.Array, " n"], timed_out: Bool[jax.Array, " n"]
     ) -> tuple[AvoidTogetherWorld, Outcome]:
         """The world's verdict: it succeeds when all are past the end, and nothing was touched until then."""
         a, radius = self.agents, self.shape.radius

@@ -117,7 +117,7 @@ class DodgeConfig(TaskConfig):
 
     def shows(self, name: str) -> bool:
         """The ball by choice."""
-        return self.shows_ball or name not in ("ball", "ball_velocity")
+        return super().shows(name) and (self.shows_ball or name not in ("ball", "ball_velocity"))
 
     def showing(self, names: Sequence[str]) -> "DodgeConfig":
         """For a policy that is told of the ball, or not."""

@@ -55,10 +55,6 @@ class DodgeGoal(Goal):
         xp = namespace(memory.yaw)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.yaw.shape, 3))
 
-    def position_error(self, memory: DodgeMemory, time: Array, body: Any) -> Array:
-        """The place minus position."""
-        return self.goal(memory, time) - body.position
-
     def thrower(self, memory: DodgeMemory, time: Array, body: Any) -> Array:
         """A point in the middle of the thrower's sector minus position."""
         xp, away = namespace(memory.yaw), SHOWN_AHEAD
@@ -89,7 +85,7 @@ class DodgeGoal(Goal):
         return (there * velocity).sum(1)
 
     observation = (
-        (Field("position_error", 3, "world", "m", 1.0, "the vehicle's place minus its position"), position_error),
+        (Field("position_error", 3, "world", "m", 1.0, "the vehicle's place minus its position"), Goal.position_error),
         (
             Field("thrower", 3, "world", "m", 4.0, "a point ahead, about where balls come from, minus its position"),
             thrower,

@@ -54,7 +54,7 @@ class HoverConfig(TaskConfig):
             weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
             steps=14_000_000,
             chunk=60,
-        ),
+        )
     }
     rotors: ClassVar = Robust(
         weights={"prog2": 1.0, "near": 0.3, "v1": 0.1, "anglev_sq": 0.03, "act2_sq": 0.05},

@@ -34,12 +34,8 @@ class HoverGoal(Goal):
         xp = namespace(time, memory)
         return xp.broadcast_to(xp.asarray(self.config.target), (*memory.shape, 3))
 
-    def position_error(self, memory: Array, time: Array, body: Any) -> Array:
-        """Target minus position."""
-        return self.goal(memory, time) - body.position
-
     observation = (
-        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
+        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), Goal.position_error),
     )
 
     @classmethod

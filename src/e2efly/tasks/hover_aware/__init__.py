@@ -26,7 +26,7 @@ class HoverAwareConfig(TaskConfig):
             weights={"prog2": 1.0, "ori1": 1.0, "ori3": 1.0, "v1": 0.1, "anglev_sq": 0.06, "act2_sq": 0.05},
             algo={"horizon": 96, "learning_rate": 8e-3, "average": 0.99},
             steps=3_900_000,
-        ),
+        )
     }
 
     episode_s: float = 8.0

@@ -66,16 +66,12 @@ class HoverAwareGoal(Goal):
         circle = xp.stack([memory.away * xp.cos(angle), memory.away * xp.sin(angle), 0.0 * angle], axis=-1)
         return memory.centre + circle
 
-    def position_error(self, memory: HoverAwareMemory, time: Array, body: Any) -> Array:
-        """The point to hover at minus position."""
-        return self.goal(memory, time) - body.position
-
     def look_at_offset(self, memory: HoverAwareMemory, time: Array, body: Any) -> Array:
         """Position of the object to look at minus position."""
         return self.look_at(memory, time) - body.position
 
     observation = (
-        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), position_error),
+        (Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position"), Goal.position_error),
         (Field("look_at", 3, "world", "m", 4.0, "position of what to look at minus vehicle position"), look_at_offset),
     )
 

@@ -28,10 +28,6 @@ class Landing(Goal):
 
     lands: ClassVar = True
 
-    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
-        """Goal minus position."""
-        return self.goal(memory, time) - body.position
-
     def desired_yaw(self, memory: Any, state: Any) -> Array:
         """Along world x."""
         return namespace(state.position).zeros_like(state.position[:, 0])
@@ -62,7 +58,7 @@ class LandGoal(Landing):
             Field(
                 "position_error", 3, "world", "m", 1.0, "where the centre of mass is after landing, minus where it is"
             ),
-            Landing.position_error,
+            Goal.position_error,
         ),
     )
 

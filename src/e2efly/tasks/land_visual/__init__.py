@@ -86,7 +86,7 @@ class LandVisualConfig(TaskConfig):
 
     def shows(self, name: str) -> bool:
         """The position of the pad by choice."""
-        return name == ("position_error" if self.shows_position else "height")
+        return super().shows(name) and name == ("position_error" if self.shows_position else "height")
 
     def showing(self, names: Sequence[str]) -> "LandVisualConfig":
         """For a policy with or without the position of the pad."""

@@ -1,6 +1,5 @@
 """Visual landing: touch down gently on a pad of random size and shape that is known only from camera images."""
 
-import dataclasses
 from dataclasses import dataclass
 
 import jax
@@ -10,10 +9,10 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from e2efly.courses.solids import DISC, TRIANGLE
 from e2efly.policy.goal import Outcome
 from e2efly.simulation.physics import State
-from e2efly.simulation.physics.rotation import from_euler
 from e2efly.simulation.scenes.scene import Scene, Solids, distances
+from e2efly.tasks.land.world import above_pad
 from e2efly.tasks.land_visual.goal import LandVisualGoal
-from e2efly.tasks.task import at_rest, uniform
+from e2efly.tasks.task import uniform
 
 
 @jax.tree_util.register_dataclass
@@ -25,18 +24,13 @@ class LandVisual(LandVisualGoal):
         """Level, any heading, above and beside the pad."""
         state_key, outline_key = jax.random.split(key)
         c, u = self.config, uniform(state_key, n, 9)
-        low, high = c.height
-        height = self.shape.feet_height + c.pad_height + (low + high) / 2 + (high - low) / 2 * u[:, 2]
-        state = at_rest(jnp.stack([c.sideways * u[:, 0], c.sideways * u[:, 1], height], axis=-1))
-        zero = jnp.zeros(n)
-        quaternion = from_euler(zero, zero, jnp.pi * u[:, 6])
-        low, high = c.pad_size
+        zero, (low, high) = jnp.zeros(n), c.pad_size
         half = (low + high) / 4 + (high - low) / 4 * u[:, 7]
         outline = jax.random.randint(outline_key, (n,), DISC, TRIANGLE + 1)
         size = jnp.stack([half, zero + c.pad_height / 2, outline.astype(half.dtype)], axis=-1)
         centre = jnp.stack([zero, zero, zero + c.pad_height / 2], axis=-1)
         pad = Solids.of("pad", centre[:, None], size[:, None], yaw=jnp.pi * u[:, 8:])
-        return dataclasses.replace(state, velocity=c.velocity * u[:, 3:6], quaternion=quaternion), pad
+        return above_pad(c, u, self.shape.feet_height + c.pad_height), pad
 
     def scene(self, memory: Solids) -> Scene:
         """The pad on level ground."""

@@ -141,7 +141,7 @@ class RaceClutterConfig(TaskConfig):
 
     def shows(self, name: str) -> bool:
         """The gates' axes by choice."""
-        return self.shows_axes or name != "gate_axes"
+        return super().shows(name) and (self.shows_axes or name != "gate_axes")
 
     def showing(self, names: Sequence[str]) -> "RaceClutterConfig":
         """For a policy with or without the gates' axes."""

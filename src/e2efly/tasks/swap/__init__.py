@@ -5,15 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from e2efly.config import (
-    BPTTConfig,
-    NetworkConfig,
-    PPOConfig,
-    RewardConfig,
-    TaskConfig,
-    TrainConfig,
-    number,
-)
+from e2efly.config import BPTTConfig, NetworkConfig, PPOConfig, RewardConfig, TaskConfig, TrainConfig, number
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.tasks.registry import register

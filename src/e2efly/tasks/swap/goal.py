@@ -60,10 +60,6 @@ class SwapGoal(Goal):
         """The place."""
         return memory.place
 
-    def position_error(self, memory: Any, time: Array, body: Any) -> Array:
-        """The place minus position."""
-        return memory.place - body.position
-
     def others(self, memory: Any, time: Array, body: Any) -> Array:
         """See `Others.offsets`."""
         return memory.others.offsets(body)

@@ -54,7 +54,7 @@ class TrackConfig(TaskConfig):
             algo={"horizon": 96, "learning_rate": 6e-3, "average": 0.99},
             steps=4_000_000,
             chunk=60,
-        ),
+        )
     }
     paper: ClassVar = Paper(
         weights={"prog2": 0.02, "ori2": 0.001, "v1": 0.002, "anglev": 0.002},

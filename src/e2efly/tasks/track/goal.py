@@ -15,16 +15,7 @@ from e2efly.config.numbers import BODY_RATE, SPEED
 from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
-from e2efly.courses.references import (
-    LONGEST,
-    POINTS,
-    SPACING,
-    Lissajous,
-    Spline,
-    knot_count,
-    read_csv,
-    through_points,
-)
+from e2efly.courses.references import LONGEST, POINTS, SPACING, Lissajous, Spline, knot_count, read_csv, through_points
 from e2efly.policy.goal import Course, Goal, Outcome, Shape
 from e2efly.policy.observation import Field
 from e2efly.tasks.route import Route, place
@@ -108,10 +99,7 @@ class TrackGoal(Goal):
 
 
 _CURVE = ("centre", "radius", "phase", "duration")
-_OPTIONS = {
-    "circle": ("circle_rate", *_CURVE),
-    "lemniscate": ("lemniscate_speed", *_CURVE),
-}
+_OPTIONS = {"circle": ("circle_rate", *_CURVE), "lemniscate": ("lemniscate_speed", *_CURVE)}
 """The options of each kind of reference, except a file."""
 
 

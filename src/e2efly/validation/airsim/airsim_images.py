@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from e2efly.validation.airsim import frames
-from e2efly.validation.airsim.protocol import Dialect
+from e2efly.validation.airsim.protocol import Dialect, turn_of, vector_of
 
 SCENE, DEPTH_PLANAR, DEPTH_PERSPECTIVE, SEGMENTATION = 0, 1, 2, 5
 """Values of `ImageCaptureBase::ImageType`: colours, depth along the optical axis, distance, a colour for each
@@ -64,14 +64,10 @@ def picture(answer: Any, request: Mapping[str, Any], dialect: Dialect) -> Pictur
     assert isinstance(height, int)
     if response.get("image_type") != request["image_type"]:
         raise _refusal("image_type", response.get("image_type"), str(request["image_type"]))
-    pose = response.get("camera_position"), response.get("camera_orientation")
-    position = np.array([_number(pose[0], "camera_position", name) for name in ("x_val", "y_val", "z_val")])
-    turn = np.array([_number(pose[1], "camera_orientation", name) for name in ("w_val", "x_val", "y_val", "z_val")])
-    length = float(np.linalg.norm(turn))
-    if abs(length - 1) > 0.01:
-        raise _refusal("camera_orientation", turn.tolist(), "a unit quaternion")
+    position = vector_of(response.get("camera_position"), "ImageResponse.camera_position")
+    turn = turn_of(response.get("camera_orientation"), "ImageResponse.camera_orientation")
     image = _depth if request["pixels_as_float"] else _colours
-    return Picture(image(response, width, height, dialect), frames.world(position), frames.attitude(turn / length))
+    return Picture(image(response, width, height, dialect), frames.world(position), frames.attitude(turn))
 
 
 def field_of_view(answer: Any) -> float:
@@ -123,13 +119,6 @@ def _colours(response: Mapping[str, Any], width: int, height: int, dialect: Dial
         raise _refusal("image_data_uint8", _size(data), accepted)
     image = np.frombuffer(data, np.uint8).reshape(height, width, 3)
     return image[..., [dialect.colours.index(colour) for colour in "RGB"]]
-
-
-def _number(structure: Any, field: str, name: str) -> float:
-    value = structure.get(name) if isinstance(structure, dict) else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _refusal(f"{field}.{name}", value, "a finite number")
-    return float(value)
 
 
 def _size(data: Any) -> str:

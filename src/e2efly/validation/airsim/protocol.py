@@ -94,20 +94,35 @@ def rigid_state(answer: Any) -> RigidState:
     Raises:
         ValueError: naming the field that is missing or is not a finite number.
     """
-    q = np.array([_number(answer, "orientation", name) for name in ("w_val", "x_val", "y_val", "z_val")])
+    told = answer if isinstance(answer, dict) else {}
+    quaternion = turn_of(told.get("orientation"), "KinematicsState.orientation")
     position, velocity, rate = (
-        np.array([_number(answer, field, name) for name in ("x_val", "y_val", "z_val")])
+        vector_of(told.get(field), f"KinematicsState.{field}")
         for field in ("position", "linear_velocity", "angular_velocity")
     )
+    return RigidState(frames.world(position), frames.world(velocity), frames.attitude(quaternion), frames.body(rate))
+
+
+def vector_of(told: Any, field: str) -> np.ndarray:
+    """(3,) the numbers of a `Vector3r`.
+
+    Raises:
+        ValueError: naming the field, the value and what is accepted.
+    """
+    return np.array([_number(told, field, name) for name in ("x_val", "y_val", "z_val")])
+
+
+def turn_of(told: Any, field: str) -> np.ndarray:
+    """(4,) the unit quaternion wxyz of a `Quaternionr`. Errors are as for `vector_of`."""
+    q = np.array([_number(told, field, name) for name in ("w_val", "x_val", "y_val", "z_val")])
     length = float(np.linalg.norm(q))
     if abs(length - 1) > 0.01:
-        raise ValueError(f"KinematicsState.orientation is {q.tolist()}; accepted: a unit quaternion")
-    return RigidState(frames.world(position), frames.world(velocity), frames.attitude(q / length), frames.body(rate))
+        raise ValueError(f"{field} is {q.tolist()}; accepted: a unit quaternion")
+    return q / length
 
 
-def _number(answer: Any, field: str, name: str) -> float:
-    value = answer.get(field) if isinstance(answer, dict) else None
-    value = value.get(name) if isinstance(value, dict) else None
+def _number(told: Any, field: str, name: str) -> float:
+    value = told.get(name) if isinstance(told, dict) else None
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise ValueError(f"KinematicsState.{field}.{name} is {value!r}; accepted: a finite number")
+        raise ValueError(f"{field}.{name} is {repr(value)[:120]}; accepted: a finite number")
     return float(value)

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int, UInt8
 
 from e2efly.config.drawing import Face, Line
 from e2efly.control import Quat
+from e2efly.control.vectors import rotate
 from e2efly.simulation.scenes.faces import box, cylinder
 from e2efly.simulation.scenes.meshes.engine import needed
 from e2efly.viewing.watch.stage import Source, Stage, StageFrame
@@ -33,7 +34,6 @@ from e2efly.viewing.watch.triangles import (
     quadrotor,
     rgb,
     spun,
-    turned,
 )
 
 SIZE = (360, 640)
@@ -309,7 +309,7 @@ def film(
             + _flying(shape, frame, angle, radius)
             + _trails(past, 0.03 * radius)
         )
-        ahead = turned(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
+        ahead = rotate(frame.quaternion[0], np.array([1.0, 0.0, 0.0]))
         match camera:
             case "first person":
                 place = here + NOSE * ahead, here + ahead
@@ -343,7 +343,7 @@ def _flying(shape: Quadrotor, frame: StageFrame, angle: np.ndarray, radius: floa
     """The vehicles, and the goal of the first vehicle: a ring around it, and a ball until the vehicle is there."""
 
     def placed(mesh: Mesh, place: np.ndarray, attitude: np.ndarray) -> Mesh:
-        return Mesh(place + turned(attitude[None], mesh.vertices), mesh.faces, mesh.colour)
+        return Mesh(place + rotate(attitude[None], mesh.vertices), mesh.faces, mesh.colour)
 
     meshes = [placed(m, p, q) for p, q in zip(frame.position, frame.quaternion, strict=True) for m in shape.body]
     rotors = zip(*spun(shape, frame.position, frame.quaternion, angle), strict=True)

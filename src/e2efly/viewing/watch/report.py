@@ -11,7 +11,7 @@ import numpy as np
 
 from e2efly.config.reading import read
 from e2efly.config.storage import read_json
-from e2efly.validation.evaluation import candidate
+from e2efly.validation.candidate import candidate
 from e2efly.validation.starts import Starts, draw_starts
 from e2efly.vehicles.vehicle import Controller, Vehicle
 from e2efly.viewing.flights import Flights

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from e2efly.config.drawing import Face
-from e2efly.control import Quat, Vec3
+from e2efly.control.vectors import rotate
 from e2efly.simulation.scenes.faces import Quads, box, cylinder
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -128,11 +128,6 @@ def _bar(start: np.ndarray, end: np.ndarray, thick: float) -> Quads:
     return box([length / 2, thick / 2, thick / 3]) @ turned.T + np.array([*(start + end) / 2, 0.0])
 
 
-def turned(quaternion: Float[np.ndarray, "*n 4"], vector: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Vectors of the body frame in world axes. The quaternions are unit quaternions, wxyz."""
-    return Quat.of(quaternion).rotate(Vec3.of(vector)).stack()
-
-
 def spun(
     shape: Quadrotor,
     position: Float[np.ndarray, "n 3"],
@@ -147,7 +142,7 @@ def spun(
         quaternion: attitudes of the vehicles, wxyz, body to world.
         angle: angle of each rotor about body z, rad.
     """  # fmt: skip
-    places = position[:, None] + turned(quaternion[:, None], shape.rotors[None])
+    places = position[:, None] + rotate(quaternion[:, None], shape.rotors[None])
     w, x, y, z = np.moveaxis(quaternion, -1, 0)[:, :, None]
     c, s = np.cos(angle / 2), np.sin(angle / 2)
     attitude = np.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], axis=-1)

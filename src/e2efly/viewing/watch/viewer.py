@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from e2efly.config.drawing import Face, Line, Mark
+from e2efly.control.vectors import rotate
 from e2efly.logs.scripts.origins import refusal
 from e2efly.simulation.scenes.faces import FacesBody
 from e2efly.viewing.watch.port import free_port
@@ -28,7 +29,6 @@ from e2efly.viewing.watch.triangles import (
     quadrotor,
     rgb,
     spun,
-    turned,
 )
 
 Camera = Literal["follow", "orbit", "first person"]
@@ -292,7 +292,7 @@ class Viewer:
 
 
 def _look_ahead(camera: Any, here: np.ndarray, q: np.ndarray) -> None:
-    ahead, up = turned(q[None], np.eye(3)[[0, 2]])
+    ahead, up = rotate(q[None], np.eye(3)[[0, 2]])
     eye = here + NOSE * ahead
     camera.up_direction = up
     camera.position = eye

@@ -9,7 +9,7 @@ import numpy as np
 from e2efly import __version__
 from e2efly.config.storage import write_atomically
 from e2efly.policy.loader import INPUT, MEMORY, load_policy
-from e2efly.validation.evaluation import Candidate
+from e2efly.validation.candidate import Candidate
 from e2efly.viewing.web.exported import STARTS, course, still
 from e2efly.viewing.web.lowering import NoInstructionError, lowered
 from e2efly.viewing.web.policy_graph import policy_function

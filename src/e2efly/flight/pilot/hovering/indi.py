@@ -46,7 +46,7 @@ class FeltResponse:
 @register("indi")
 @dataclass(frozen=True)
 class Indi:
-    """The controller. Its memory is `Felt`.
+    """The controller. Its memory is `FeltResponse`.
 
     If the rotor speeds are not known, the thrust is that of the commands after the lag of the motors.
     """
@@ -68,14 +68,7 @@ class Indi:
         return FeltResponse()
 
     def step(
-        self,
-        memory: FeltResponse,
-        seen: Seen,
-        under_way: UnderWay,
-        place: Place,
-        dt: float,
-        *,
-        held: bool = False,
+        self, memory: FeltResponse, seen: Seen, under_way: UnderWay, place: Place, dt: float, *, held: bool = False
     ) -> tuple[FeltResponse, Ctbr]:
         """See `HoverController.step`."""
         vehicle, motion, goal = self.vehicle, seen, place.after(-seen.age)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from e2efly.control.vectors import rotate
 from e2efly.flight.pose.gates.association import Expected, associated
 from e2efly.flight.pose.gates.lens import NEAREST, Corners, Lens, Openings
 from e2efly.vehicles.gravity import GRAVITY
@@ -256,5 +257,4 @@ def quaternion_of(rotation: np.ndarray) -> np.ndarray:
 
 def rotation_of(quaternion: np.ndarray) -> np.ndarray:
     """(3, 3) rotation matrix of a unit quaternion (4,) wxyz."""
-    w, vector = quaternion[0], quaternion[1:]
-    return (w * w - vector @ vector) * EYE + 2 * np.outer(vector, vector) + 2 * w * crossing(vector)
+    return rotate(quaternion, EYE).T

@@ -74,12 +74,18 @@ def load_setup(path: Path) -> GateSetup:
             raise ValueError(f"{path}: camera.{key} is {value:g}; accepted: {low:g} to {high:g}")
         return value
 
+    def pixels(key: str) -> int:
+        value = of(key, 32, 4096)
+        if value != int(value):
+            raise ValueError(f"{path}: camera.{key} is {value:g}; accepted: a whole number of pixels, 32 to 4096")
+        return int(value)
+
     fov = numbers(f"{path}: camera.fov", camera["fov"], 2, " of degrees")
     if not np.all((fov > 1) & (fov < 170)):
         raise ValueError(f"{path}: camera.fov is {fov.tolist()}; accepted: two angles of 1 to 170 degrees")
     place = numbers(f"{path}: camera.position", camera.get("position", [0.0, 0.0, 0.0]), 3, " of metres")
     lens = Lens(
-        int(of("width", 32, 4096)), int(of("height", 32, 4096)), (math.radians(fov[0]), math.radians(fov[1])),
+        pixels("width"), pixels("height"), (math.radians(fov[0]), math.radians(fov[1])),
         math.radians(of("pitch", -90, 90)), tuple(place.tolist()), of("readout", 0.0, 0.1, 0.0),
     )  # fmt: skip
     return GateSetup(

@@ -1,0 +1,88 @@
+"""Imitation of another policy that is told more (DAgger, Ross et al. 2011).
+
+The policy that learns flies, and at each state that it meets, the teacher says what it would do there. The error of the
+action is minimised over windows of steps, through the recurrent network but not through physics: what the teacher does
+already looks ahead. At the start of a run the teacher flies in a share of the windows, so that the policy sees where a
+good flight leads.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from e2efly.config import DAggerConfig
+from e2efly.environment import Env, EnvState
+from e2efly.learning.algorithm import Algorithm, TrainState, adam_state, annealed, descend
+from e2efly.learning.networks import Weights
+from e2efly.learning.rollout import RolloutState, StepRecord, advance
+from e2efly.learning.teacher import Teacher, teacher_of
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class DAggerParameters:
+    """What DAgger learns."""
+
+    policy: Weights
+
+
+class DAgger(Algorithm):
+    """Imitation of a teacher; see the module."""
+
+    def init(self, env: Env, config: DAggerConfig, seed: int) -> DAggerParameters:
+        """A fresh network, made by NumPy.
+
+        Raises:
+            ValueError: for a teacher that does not fly in this environment.
+        """
+        teacher(env, config).check(env)
+        return DAggerParameters(self.actor.init(np.random.default_rng(seed), np.asarray(env.hover)))
+
+    def optimizer(self, config: DAggerConfig, parameters: DAggerParameters) -> Any:
+        """Adam's initial state."""
+        return adam_state(config, parameters.policy)
+
+    def replay(self, env: Env, config: DAggerConfig, state: EnvState, observation: Float[Array, "n o"]) -> Array:
+        """The teacher's memory."""
+        return teacher(env, config).memory(observation.shape[0])
+
+    def update(
+        self, env: Env, config: DAggerConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """One window and one gradient step."""
+        key, drawn = jax.random.split(state.key)
+        guide, rate = teacher(env, config), annealed(config, progress)
+        led = 1 - progress / jnp.maximum(config.led, 1e-6)
+        leads = jax.random.uniform(drawn, (state.observation.shape[0], 1)) < led
+
+        def loss(policy: Weights) -> tuple[Array, Any]:
+            def step(carry: tuple[RolloutState, Array], _: None) -> tuple[Any, Any]:
+                at, remembered = carry
+                features = self.actor.features(at.observation, at.env.images)
+                action, memory = self.actor(policy, features, at.memory)
+                wanted, remembered = guide.act(env, at.env, remembered)
+                flown = jax.lax.stop_gradient(jnp.where(leads, wanted, action))
+                after, out = advance(env, config, at, flown, memory, critic=False)
+                remembered = jnp.where(out.done[:, None], 0.0, remembered)
+                return (after, remembered), (jnp.mean((action - wanted) ** 2), StepRecord.of(out))
+
+            first = RolloutState.of(state), state.replay
+            end, (error, record) = jax.lax.scan(step, first, None, length=config.horizon)
+            return jnp.mean(error), (end, record.metrics())
+
+        (error, ((end, remembered), metrics)), gradient = jax.value_and_grad(loss, has_aux=True)(
+            state.parameters.policy
+        )
+        policy, optimizer, norm = descend(config, rate, state.parameters.policy, state.optimizer, gradient)
+        metrics |= {"loss/imitation": error, "loss/gradient_norm": norm}
+        parameters = DAggerParameters(policy)
+        return end.into(state, parameters=parameters, optimizer=optimizer, key=key, replay=remembered), metrics
+
+
+def teacher(env: Env, config: DAggerConfig) -> Teacher:
+    """The teacher that the options name: by default, the zoo's policy of the same task."""
+    return teacher_of(config.teacher or env.task.config.name)

@@ -1,0 +1,87 @@
+"""A policy that another one learns from: its network in JAX, and what it is shown."""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from e2efly.environment import Env, EnvState
+from e2efly.learning.networks import Actor, Weights
+from e2efly.learning.warm_start import network_of, weights_of
+from e2efly.policy.contract import Contract
+from e2efly.policy.loader import load_policy
+from e2efly.policy.zoo import policy_file
+
+
+@dataclass(frozen=True)
+class Teacher:
+    """A policy without cameras that flies in an environment which may hide from others what it sees."""
+
+    contract: Contract
+    actor: Actor
+    weights: Weights
+
+    def memory(self, n: int) -> Float[Array, "n m"]:
+        """Its memories at the start of an episode."""
+        return self.actor.memory(n)
+
+    def act(
+        self, env: Env, state: EnvState, memory: Float[Array, "n m"]
+    ) -> tuple[Float[Array, "n c"], Float[Array, "n m"]]:
+        """Its actions and its next memories. It is shown the true motion, without age and errors."""
+        told = env.showing([field.name for field in self.contract.observation])
+        told = dataclasses.replace(told, seen_actions=self.contract.past_actions)
+        features = self.actor.features(told.shown(state, state.vehicle))
+        action, memory = self.actor(self.weights, features, memory)
+        return jax.lax.stop_gradient((action, memory))
+
+    def check(self, env: Env) -> None:
+        """Refuse an environment in which it cannot fly.
+
+        Raises:
+            ValueError: naming what the teacher sees or commands, and what the environment has.
+        """
+        names = [field.name for field in self.contract.observation]
+        told = dataclasses.replace(env.showing(names), seen_actions=self.contract.past_actions)
+        known = {field.name: (field.size, field.frame, field.scale) for field in told.fields}
+        for field in self.contract.observation:
+            if known.get(field.name) != (field.size, field.frame, field.scale):
+                raise ValueError(
+                    f"algo.teacher observes {field.name} with {field.size} numbers; accepted: a policy that observes "
+                    f"some of {', '.join(f'{name} ({size})' for name, (size, *_) in known.items())}"
+                )
+        if env.queue < self.contract.past_actions:
+            raise ValueError(
+                f"algo.teacher observes {self.contract.past_actions} past actions; accepted: at most {env.queue}, as "
+                f"many as this environment keeps, or env.past_actions {self.contract.past_actions}"
+            )
+        action = self.contract.action
+        has = np.stack([np.asarray(action.low), np.asarray(action.high)])
+        wanted = np.stack([env.center - env.half, env.center + env.half])
+        if action.mode != env.physics.command_mode or has.shape != wanted.shape or not np.allclose(has, wanted, 1e-4):
+            raise ValueError(
+                f"algo.teacher commands {action.mode} from {list(action.low)} to {list(action.high)}; accepted: "
+                f"{env.physics.command_mode} from {wanted[0].tolist()} to {wanted[1].tolist()}"
+            )
+
+
+@cache
+def teacher_of(policy: str) -> Teacher:
+    """A teacher by its name: a task of the zoo, a run, or a policy.onnx.
+
+    Raises:
+        ValueError: when there is no such policy, when it sees images, and when its network is not one of e2efly.
+    """
+    file = policy_file(policy)
+    loaded = load_policy(file)
+    if loaded.contract.images:
+        raise ValueError(f"algo.teacher is {policy}, which sees images; accepted: a policy without images")
+    fields = loaded.contract.observation
+    actor = Actor.of(fields, (), network_of(file, loaded))
+    like = actor.init(np.random.default_rng(0), np.asarray(loaded.contract.hover_action))
+    weights = weights_of(file, loaded.content, like, actor)
+    return Teacher(loaded.contract, actor, jax.tree.map(jnp.asarray, weights))

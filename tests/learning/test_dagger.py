@@ -1,0 +1,84 @@
+"""Imitation of a policy that is told more."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from e2efly.config import DAggerConfig
+from e2efly.environment import random_key
+from e2efly.learning.algorithm import begin
+from e2efly.learning.devices import OWN, on_each, own, stacked
+from e2efly.learning.setup import Setup
+from e2efly.learning.teacher import teacher_of
+from e2efly.policy.loader import load_policy
+from e2efly.runs.presets import preset
+from e2efly.simulation.physics import State
+
+
+def setup(task: str = "hover", env: dict[str, Any] | None = None, **algo: Any) -> Setup:
+    config = preset(task, "dagger", "nominal")
+    settings = dataclasses.replace(config.algo, **({"envs": 64, "horizon": 16} | algo))
+    return Setup.of(dataclasses.replace(config, algo=settings, env=dataclasses.replace(config.env, **(env or {}))))
+
+
+def test_it_learns_what_the_teacher_does_without_being_told_the_same() -> None:
+    made = setup(led=0.25, env={"past_actions": 4}, horizon=48)  # five windows in an episode
+    algorithm, env, config = made.algorithm, made.env, made.config.algo
+    updates = 400
+
+    def run(start: Any) -> Any:
+        def update(state: Any, i: Any) -> Any:
+            return algorithm.update(env, config, state, i / updates)
+
+        state = begin(algorithm, env, config, made.parameters(), own(start))
+        return stacked(jax.lax.scan(update, state, jnp.arange(updates))[1])
+
+    metrics = jax.tree.map(lambda x: x[0], on_each(run, 1, (OWN,), OWN)(stacked(random_key(0))))
+    error, success = (np.asarray(metrics[name]) for name in ("loss/imitation", "train_success"))
+    assert error[-20:].mean() < 0.4 * error[:5].mean()
+    assert success[-20:].max() > 0.9, "it flies by what it has learned"
+
+
+def test_a_teacher_flies_as_its_file_does() -> None:
+    env = setup("race_eyes").env
+    guide, policy = teacher_of("race_any"), load_policy("race_any")
+    state, _ = env.reset(random_key(3), 5)
+    shaken = dataclasses.replace(state, vehicle=turned(state.vehicle))
+    told = dataclasses.replace(env.showing([f.name for f in policy.contract.observation]), seen_actions=2)
+    action, _ = guide.act(env, shaken, guide.memory(5))
+    for one, row in zip(np.asarray(action), np.asarray(told.shown(shaken, shaken.vehicle)), strict=True):
+        np.testing.assert_allclose(one, policy.act(row)[0], atol=1e-5)
+
+
+def turned(body: State) -> State:
+    velocity = jax.random.normal(random_key(4), body.velocity.shape)
+    return dataclasses.replace(body, velocity=velocity, body_rate=0.3 * velocity)
+
+
+@pytest.mark.parametrize(
+    ("task", "algo", "said"),
+    [
+        ("hover", {"teacher": "race_clutter"}, "algo.teacher is race_clutter, which sees images"),
+        (
+            "hover",
+            {"teacher": "race_any"},
+            "algo.teacher observes gates with 9 numbers; accepted: a policy that observes",
+        ),
+        ("hover", {"teacher": "crazyflie/hover"}, "algo.teacher"),
+        ("hover", {"teacher": "no/such"}, "no/such"),
+    ],
+)
+def test_a_teacher_that_cannot_fly_here_is_refused(task: str, algo: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        setup(task, **algo).parameters()
+
+
+def test_by_default_the_teacher_is_the_zoos_policy_of_the_task() -> None:
+    assert DAggerConfig().teacher == ""
+    assert setup("hover", env={"past_actions": 4}).parameters()
+    with pytest.raises(ValueError, match=r"observes 4 past actions; accepted: at most 3, .* or env.past_actions 4"):
+        setup("hover").parameters()
