@@ -19,9 +19,9 @@ VEHICLES = {
     "vis_r": ("VIS-R", ""),
     "crazyflie": (
         "Crazyflie",
-        "Policies for any quadrotor: RAPTOR's published checkpoint, ours by rotors, and ours by thrust and body rates "
-        "([all three on a thousand vehicles](any-vehicle.md#beside-raptor)). RAPTOR was trained without delays. But "
-        "for those of the latency, all rows fly with the 20 ms of the vehicle file.",
+        "Policies for any quadrotor that command rotors: RAPTOR's published checkpoint, and ours ([on a thousand "
+        "vehicles](any-vehicle.md#beside-raptor)). RAPTOR was trained without delays. But for those of the latency, all "
+        "rows fly with the 20 ms of the vehicle file. -: not measured.",
     ),
 }
 """The tables in their order, by the vehicle that flies: its name, and what is compared."""
