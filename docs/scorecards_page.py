@@ -20,8 +20,8 @@ VEHICLES = {
     "crazyflie": (
         "Crazyflie",
         "Policies for any quadrotor that command rotors: RAPTOR's published checkpoint, and ours ([on a thousand "
-        "vehicles](any-vehicle.md#beside-raptor)). RAPTOR was trained without delays. But for those of the latency, all "
-        "rows fly with the 20 ms of the vehicle file. -: not measured.",
+        "vehicles](any-vehicle.md#beside-raptor)). RAPTOR was trained without delays. But for those of the latency, "
+        "all rows fly with the 20 ms of the vehicle file. -: not measured.",
     ),
 }
 """The tables in their order, by the vehicle that flies: its name, and what is compared."""
