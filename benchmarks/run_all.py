@@ -17,6 +17,8 @@ OTHERS = (
     "rate_loop", "runtime_speed", "c_export", "onboard", "msp_fuzz", "log_fuzz", "policy_fuzz",
     "sim_to_sim", "firmware_flights", "firmware_vehicles",
     "firmware_faults", "command_flights", "controllers", "fault_campaign --publish", "process_faults", "bridge_loop",
+    "mavlink", "crazyflie", "scorecards",
+    "scorecards --vehicle crazyflie --flown policy --policies raptor any/hover_rotors any/hover",
     "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
     "multirotor", "eyes", "eyes --rows --flights 40", "eyes --firmware 5", "exchanges",
     "identify", "identify --plant structure --bare --first 1010", "step_response",

@@ -26,6 +26,7 @@ KEYS = ("policy", "task", "vehicle")
 
 def card_of(policy: str, flown: str, vehicle: str, out: Path, episodes: int, flights: int) -> dict[str, Any]:
     """The card of a policy, or of a controller in its place."""
+    out.mkdir(parents=True, exist_ok=True)
     folder = out / f"{policy.replace('/', '-')}-{flown}-{vehicle}"
     controller = None if flown == "policy" else flown
     file = str(raptor(out)) if policy == "raptor" else policy
@@ -58,7 +59,10 @@ def main() -> None:
             card = card_of(policy, flown, options.vehicle, Path(options.out), **scale)
             row = in_short(card)
             rows = with_earlier("scorecards", options.json, "table", KEYS, [row])
-            about = {key: row[key] for key in KEYS} | {"sha256": card["sha256"], "rows": successes(card)}
+            last = card["parts"][-1]
+            about = {key: row[key] for key in KEYS} | {
+                "sha256": card["sha256"], "date": last["date"], "cpu": last["cpu"], "rows": successes(card),
+            }  # fmt: skip
             rows_of = with_earlier("scorecards", options.json, "cards", KEYS, [about])
             write(
                 "scorecards", options.json, {"version": VERSION, "seed": SEED, **scale, "table": rows, "cards": rows_of}

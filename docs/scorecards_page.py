@@ -14,7 +14,17 @@ from e2efly.validation.stress_laws import LAWS
 DOCS = Path(__file__).parent
 RESULTS = DOCS.parent / "benchmarks" / "results" / "scorecards.json"
 TASKS = ("hover", "land", "track", "race")
-"""The order of the tasks in the table."""
+"""The order of the tasks in a table."""
+VEHICLES = {
+    "vis_r": ("VIS-R", ""),
+    "crazyflie": (
+        "Crazyflie",
+        "Policies for any quadrotor that command rotors: RAPTOR's published checkpoint, and ours ([on a thousand "
+        "vehicles](any-vehicle.md#beside-raptor)). RAPTOR was trained without delays. But for those of the latency, "
+        "all rows fly with the 20 ms of the vehicle file. -: not measured.",
+    ),
+}
+"""The tables in their order, by the vehicle that flies: its name, and what is compared."""
 HEAD = f"""# Score a policy
 
     e2efly benchmark hover                            # a policy of the zoo
@@ -111,13 +121,29 @@ the latency of that contract, also where another one is flown. Success does not 
 def page() -> str:
     """The page."""
     found: dict[str, Any] = json.loads(RESULTS.read_text(encoding="utf-8"))
-    machine = found["machine"]
-    about = (
-        f"VIS-R, {found['episodes']} starts a row and {found['flights']} on MuJoCo, by `benchmarks/scorecards.py`, "
-        f"{found['date']}, {machine['cores']} cores of {machine['cpu']}, e2efly {machine['e2efly']}."
-    )
-    rows = sorted(found["table"], key=lambda row: (TASKS.index(row["task"]), row["policy"] != row["task"]))
-    return "\n".join([HEAD + EXAMPLE + FIELDS, about, "", *markdown(rows), AFTER])
+    lines = [
+        HEAD + EXAMPLE + FIELDS.rstrip(),
+        f"{found['episodes']} starts a row and {found['flights']} on MuJoCo, by `benchmarks/scorecards.py`, e2efly "
+        f"{found['machine']['e2efly']}.",
+    ]
+    for vehicle, (name, about) in VEHICLES.items():
+        rows = [row for row in found["table"] if row["vehicle"] == vehicle]
+        rows.sort(key=lambda row: (TASKS.index(row["task"]), row["policy"] != row["task"]))
+        measured = sorted({f"{card['date']}, {card['cpu']}" for card in found["cards"] if card["vehicle"] == vehicle})
+        rows = [_shown(row, found["cards"]) for row in rows]
+        columns = {column: "-" for row in rows for column in row}
+        lines += ["", f"### {name}", "", *([about, ""] if about else []), *markdown([columns | row for row in rows])]
+        lines += ["", f"Measured {'; '.join(measured)}."]
+    return "\n".join([*lines, AFTER])
+
+
+def _shown(row: dict[str, str], cards: list[dict[str, Any]]) -> dict[str, str]:
+    """A row without its vehicle, and with the success at no delay."""
+    (card,) = (card for card in cards if all(card[key] == row[key] for key in ("policy", "task", "vehicle")))
+    at_once = {"0 ms": f"{100 * card['rows']['latency rows, training']['0 ms']:.1f}"}
+    return {"policy": row["policy"], "task": row["task"]} | at_once | {
+        key: value for key, value in row.items() if key != "vehicle"
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

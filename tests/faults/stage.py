@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.flight.betaflight.watchdog import TIMEOUT_S, StickLander
 from e2efly.flight.descent_plan import plan_of
 from e2efly.flight.flight_loop import PLAN_PERIOD
 from e2efly.flight.link import open_link
@@ -123,7 +124,9 @@ class Stage:
 
     def renew(self) -> None:
         self.link = FaultyLink(open_link(self.rig.sitl.msp), self.random)
-        self.watchdog = VirtualWatchdog(self.rig.now, self.link) if self.gear.watched else None
+        self.watchdog = None
+        if self.gear.watched:
+            self.watchdog = VirtualWatchdog(self.rig.now, self.link, StickLander(), TIMEOUT_S)
         self.poses = FaultyPoses(PlantSource(self.rig.poses, "rig"))
 
     def open(self) -> None:

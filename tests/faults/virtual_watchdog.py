@@ -7,9 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
-from e2efly.flight.betaflight import watchdog
-from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight import watched_link
 from e2efly.flight.link import Link
+from e2efly.flight.watched_link import Lander, WatchedLink
 from tests.faults.faulty import inner
 
 UNUSED = "tcp:127.0.0.1:1"
@@ -21,31 +21,32 @@ class _Ended(BaseException):
 
 
 class VirtualWatchdog:
-    """A bridge's link through a watchdog. One at a time: the module's clock is the rig's while it lives."""
+    """A bridge's link through a watchdog. One at a time: the modules' clock is the rig's while it lives."""
 
-    def __init__(self, now: Callable[[], float], link: Link) -> None:
+    def __init__(self, now: Callable[[], float], link: Link, lander: Lander, timeout: float) -> None:
         self.stopped = False
         """Whether its process stands still."""
-        self._link, self._ending = link, False
+        self._link, self._lander, self._ending = link, lander, False
         self._problem: BaseException | None = None
         self._go, self._back = threading.Semaphore(0), threading.Semaphore(0)
-        self._taken, really = False, watchdog.land
+        self._taken, really = False, lander.land
 
-        def land(*what: Any) -> None:
+        def land(link: Link) -> None:
             self._taken = True
-            really(*what)
+            really(link)
 
+        clock = SimpleNamespace(monotonic=now, sleep=lambda seconds: self._wait())
         fakes = {
-            "land": land,
-            "time": SimpleNamespace(monotonic=now, sleep=lambda seconds: self._wait()),
+            "time": clock,
             "select": SimpleNamespace(select=lambda *_: (self._wait(), ([], [], []))[1]),
             "subprocess": SimpleNamespace(Popen=self._start, DEVNULL=None, TimeoutExpired=TimeoutError),
             "Lifeline": mock.Mock(side_effect=OSError),  # it tells of a death, and nobody dies here
         }
-        self._patches = [mock.patch.object(watchdog, name, fake) for name, fake in fakes.items()]
+        self._patches = [mock.patch.object(watched_link, name, fake) for name, fake in fakes.items()]
+        self._patches += [mock.patch(f"{type(lander).__module__}.time", clock), mock.patch.object(lander, "land", land)]
         for patch in self._patches:
             patch.start()
-        self._watched = WatchedLink(UNUSED)
+        self._watched = WatchedLink("unused", UNUSED, timeout)
 
     alive, reason, connections, taken_over, send, receive, plan = (
         inner(name, of="_watched")
@@ -88,7 +89,7 @@ class VirtualWatchdog:
         self._go.acquire()
         try:
             with mine:
-                watchdog.serve(mine, None, self._link, timeout)
+                watched_link.serve(mine, None, self._link, self._lander, timeout)
         except _Ended:
             pass
         except BaseException as problem:  # told to whoever waits

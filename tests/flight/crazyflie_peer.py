@@ -1,8 +1,9 @@
 """A Crazyflie of ours that speaks CRTP as the firmware of 2026.08 documents it, over the rigid body, in virtual time.
 
-Packets, tables of contents, log blocks, the supervisor's states and time-outs, and a mixer that has no airmode are
-written here, from the firmware's sources, and share nothing with the bridge. They prove format, order, signs and
-time-outs as read, not the firmware.
+Packets, tables of contents, log blocks, the supervisor's states and time-outs, the high-level commander's landing, and
+a mixer that has no airmode are written here, from the firmware's sources, and share nothing with the bridge. They
+prove format, order, signs and time-outs as read, not the firmware. How well its estimator goes on without poses is
+assumed.
 """
 
 import struct
@@ -11,12 +12,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from e2efly.flight.bridge import Bridge
 from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
+from e2efly.flight.crazyflie.crazyflie_watchdog import TIMEOUT_S, CommanderLander
 from e2efly.flight.crazyflie.words import TypedWish
+from e2efly.flight.landing_plan import landing_plan
 from e2efly.flight.pilot.flight_state import Mission
 from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.settings import FlightSettings
 from e2efly.vehicles.vehicle import Vehicle
+from tests.faults.virtual_watchdog import VirtualWatchdog
 from tests.flight.peer_rig import STEP_S, FlownPeer
 
 UINT8, UINT16, FLOAT = (0x08, "B"), (0x09, "H"), (0x06, "f")
@@ -34,6 +39,27 @@ LOG_NAMES = (
 LOG_KINDS = {name: (2, "H") if name == "supervisor.info" else (7, "f") for name in LOG_NAMES}
 LEVEL_S, OFF_S, FLYING_S = 0.5, 2.0, 2.0
 TILTED_S, OVER_S = 1.0, 0.1
+POSES_S, BIAS = 0.1, 0.1
+"""After this time without a pose, s, its estimator goes on by its accelerometer, in error by so much, m/s^2."""
+FASTEST, STEEPEST = 1.1, np.radians(20.0)
+"""Limits of its position control, m/s and rad."""
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A landing of the high-level commander."""
+
+    begun: float
+    seconds: float
+    start: np.ndarray
+    """Where it began, as estimated, m."""
+    descent: float
+
+    def target(self, now: float) -> np.ndarray:
+        """Where it should be: a polynomial of degree 7 that begins and ends at rest."""
+        s = min(max((now - self.begun) / self.seconds, 0.0), 1.0)
+        share = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
+        return self.start - np.array([0.0, 0.0, share * self.descent])
 
 
 @dataclass
@@ -57,6 +83,7 @@ class CrazyflieRig(FlownPeer):
         protocol: int = 12,
         needs_arming: bool = False,
         values: dict[str, float] | None = None,
+        watched: bool = False,
     ) -> None:
         super().__init__(vehicle, latency, seed)
         self.protocol, self.needs_arming = protocol, needs_arming
@@ -72,6 +99,12 @@ class CrazyflieRig(FlownPeer):
         self._rest = b""
         if needs_arming:
             self.supervisor = "passed"
+        self.dog = VirtualWatchdog(self.now, self.wire, CommanderLander(), TIMEOUT_S) if watched else None
+        """The bridge's link goes through it."""
+        self._landing: Landing | None = None
+        self._streamed = False  # set-points have priority over the high-level commander
+        self._posed, self._bias = 0.0, BIAS * self._noise.normal(size=3)
+        self._error, self._slip = np.zeros(3), np.zeros(3)  # of the estimated position and velocity
 
     def wish(self) -> TypedWish | None:
         """What the pilot has typed."""
@@ -81,15 +114,27 @@ class CrazyflieRig(FlownPeer):
         self, settings: FlightSettings, hover: HoverController | None = None, *, aids: bool = False
     ) -> Crazyflie:
         del hover, aids
-        return Crazyflie.connect(self.wire, self.world.vehicle, settings, self.wish, 1.0, self)
+        link = self.wire if self.dog is None else self.dog
+        return Crazyflie.connect(link, self.world.vehicle, settings, self.wish, 1.0, self)
 
     def command(self, rates: np.ndarray, thrust: float) -> None:
         """A set-point: body rates, rad/s, FLU, and thrust, 0 to 1."""
         self._rates, self._thrust, self._at = rates, thrust, self.time
+        self._streamed, self._landing = True, None  # any set-point ends what the high-level commander does
+
+    def plan(self, bridge: Bridge) -> None:
+        if self.dog is not None:
+            self.dog.plan(landing_plan(bridge))
+
+    def stop_watchdog(self) -> None:
+        assert self.dog is not None
+        self.dog.stopped = True
 
     # -- packets -------------------------------------------------------------------------------------------------------
 
     def hear(self) -> None:
+        if self.dog is not None:
+            self.dog.step()
         data = self._rest + self.wire.arrived()
         while data and len(data) > data[0]:
             packet, data = data[1 : 1 + data[0]], data[1 + data[0] :]
@@ -122,9 +167,17 @@ class CrazyflieRig(FlownPeer):
                 p, q, r, thrust, rate = struct.unpack("<fffHB", data[1:])
                 assert rate == 1
                 self.command(np.radians([p, -q, r]), thrust / 65535)
+            case (7, 1) if data[0] == 0:
+                struct.unpack("<I", data[1:])
+                self._streamed = False
+            case (8, 0) if data[0] == 10:
+                group, descent, relative, _, own_yaw, speed = struct.unpack("<Bf?f?f", data[1:])
+                assert group == 0 and relative and own_yaw and speed > 0
+                yield data[:3] + bytes([self._land(descent, descent / speed)])
             case (6, 1) if data[0] == 8:
                 self.pose_seen = struct.unpack("<7f", data[1:])
                 self.poses_seen += 1
+                self._posed, self._error, self._slip = self.time, np.zeros(3), np.zeros(3)
             case (9, 1) if data[0] == 1 and self.protocol >= 12:
                 self._arm(bool(data[1]))
             case (13, 0) if data[0] == 1 and self.protocol < 12:
@@ -168,6 +221,47 @@ class CrazyflieRig(FlownPeer):
         self.supervisor, self._since = state, self.time
         self.log.append(state)
 
+    def _land(self, descent: float, seconds: float) -> int:
+        """A landing from here. Returns the firmware's answer."""
+        if self._landing is not None:
+            return 1
+        self._landing = Landing(self.time, seconds, self._estimated()[0], descent)
+        self.log.append("failsafe: landing")
+        return 0
+
+    def _estimated(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position and velocity of its estimator, which may have no poses. The complementary one knows only heights."""
+        known = np.array([0.0, 0.0, 1.0]) if self.values["stabilizer.estimator"] == 1 else np.ones(3)
+        return known * (self.state.position + self._error), known * (self.state.velocity + self._slip)
+
+    def _high_level(self) -> None:
+        """The set-points of the high-level commander, where others do not have priority."""
+        if self.time - self._posed > POSES_S and self.values["stabilizer.estimator"] != 1:
+            self._slip = self._slip + STEP_S * self._bias
+            self._error = self._error + STEP_S * self._slip
+        if self._landing is not None and self.time > self._landing.begun + self._landing.seconds:
+            self._landing = None
+        if self._streamed:
+            return
+        self._at, self._rates, self._thrust = self.time, np.zeros(3), 0.0  # without a landing: motors off
+        if self._landing is None:
+            return
+        position, velocity = self._estimated()
+        wanted = np.clip(2.0 * (self._landing.target(self.time) - position), -FASTEST, FASTEST)
+        push = 3.0 * (wanted - velocity)
+        tilt = np.hypot(*push[:2]) / 9.81 / np.tan(STEEPEST)
+        push[:2] /= max(tilt, 1.0)
+        push[2] = max(push[2] + 9.81, 1.0)
+        w, x, y, z = np.asarray(self.state.quaternion)
+        rotation = np.array([
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ])  # fmt: skip
+        self._rates = 6.0 * rotation.T @ np.cross(rotation[:, 2], push / np.linalg.norm(push)) * [1, 1, 0]
+        force = float(self.world.vehicle.mass) * float(push @ rotation[:, 2])
+        self._thrust = min(max(force / (4 * self.thrust(self.world.full_speed)), 0.001), 1.0)
+
     @property
     def _allowed(self) -> bool:
         return self.supervisor in ("ready", "flying", "level", "landed")
@@ -199,6 +293,7 @@ class CrazyflieRig(FlownPeer):
 
     def outputs(self) -> np.ndarray:
         """The firmware's PID: thrust, with torques that a motor without more thrust cannot follow."""
+        self._high_level()
         self._supervise()
         if not self._allowed or self._thrust == 0 or self.values["stabilizer.stop"]:
             return np.zeros(4)

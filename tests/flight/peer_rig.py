@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from e2efly.flight.bridge import Bridge
 from e2efly.policy.odometry import Sample
 from e2efly.validation.world import FlownBody, World
 from e2efly.vehicles.vehicle import Vehicle
@@ -125,6 +126,12 @@ class FlownPeer:
     def tell(self) -> None:
         """Send telemetry."""
         raise NotImplementedError
+
+    def plan(self, bridge: Bridge) -> None:
+        """Let the bridge's watchdog know its plan, if there is one."""
+
+    def stop_watchdog(self) -> None:
+        """Let the watchdog's process stand still, if there is one."""
 
     # -- what a bench offers -------------------------------------------------------------------------------------------
 

@@ -117,7 +117,7 @@ def test_a_bridge_that_the_watchdog_has_replaced_ends_when_it_is_asked_to_and_sa
 
     fly(bridge, 100.0, watchdog=watchdog, say=said.append, stop=stop, clock=clock)
     assert bridge.steps == pytest.approx(400, abs=2)
-    assert any("silent for 60 ms; it keeps the link until you disarm" in line for line in said)
+    assert any("silent for 60 ms; it keeps the link until its landing is over" in line for line in said)
 
 
 def test_on_the_ground_the_watchdog_keeps_the_throttle_of_an_armed_vehicle_closed() -> None:

@@ -23,10 +23,21 @@ from unittest.mock import Mock
 import pytest
 
 from e2efly.flight.attitude import Attitude
+from e2efly.flight.autopilots import check_link
 from e2efly.flight.betaflight import watchdog
 from e2efly.flight.betaflight.codec import REPLY, Decoder, MspFrame, encode
 from e2efly.flight.betaflight.messages import SET_RAW_RC, AttitudeReply, StatusEx, set_raw_rc
-from e2efly.flight.betaflight.watchdog import LEVEL_GAIN, LEVEL_RATE, STALE_S, DescentPlan, WatchedLink, descent
+from e2efly.flight.betaflight.watchdog import (
+    LEVEL_GAIN,
+    LEVEL_RATE,
+    PROGRAM,
+    STALE_S,
+    TIMEOUT_S,
+    DescentPlan,
+    StickLander,
+    descent,
+)
+from e2efly.flight.watched_link import WatchedLink
 from tests.faults.virtual_watchdog import VirtualWatchdog
 from tests.flight.test_msp_client import Wire
 from tests.waiting import running, until
@@ -94,7 +105,7 @@ class TestDescent:
 
 def test_a_bridge_that_has_no_port_to_send_to_is_not_silent() -> None:
     now, gone = [0.0], Mock(alive=False, reason="unplugged", connections=1, receive=bytes)
-    dog = VirtualWatchdog(lambda: now[0], gone)
+    dog = VirtualWatchdog(lambda: now[0], gone, StickLander(), TIMEOUT_S)
     try:
         dog.plan(PLAN)
         for _ in range(50):
@@ -193,9 +204,10 @@ BRIDGE = """
 import json, sys, time
 from e2efly.flight.betaflight.codec import encode
 from e2efly.flight.betaflight.messages import set_raw_rc
-from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
+from e2efly.flight.betaflight.watchdog import PROGRAM, DescentPlan
+from e2efly.flight.watched_link import WatchedLink
 target, sticks, plan = sys.argv[1], json.loads(sys.argv[2]), DescentPlan(**json.loads(sys.argv[3]))
-link = WatchedLink(target, 1.0)
+link = WatchedLink(PROGRAM, target, 1.0)
 print(link._process.pid, flush=True)
 while not link.taken_over:
     link.poll(0.0)
@@ -246,7 +258,7 @@ def fly(controller: Controller) -> Iterator[Callable[..., Flying]]:
 
 
 def watched(controller: Controller) -> WatchedLink:
-    link = WatchedLink(controller.target)
+    link = WatchedLink(PROGRAM, controller.target, TIMEOUT_S)
     until(lambda: link.poll(0.0) or link.alive)
     return link
 
@@ -265,7 +277,7 @@ def check_landing(controller: Controller, since: float) -> None:
 
 
 def test_bytes_are_handed_through_both_ways_and_the_end_on_the_ground_is_silent(controller: Controller) -> None:
-    link = WatchedLink(controller.target)
+    link = WatchedLink(PROGRAM, controller.target, TIMEOUT_S)
     assert not link.alive and link.reason
     until(lambda: link.poll(0.0) or link.alive)
     assert link.connections == 1 and link.reason == ""
@@ -291,7 +303,7 @@ def test_bytes_are_handed_through_both_ways_and_the_end_on_the_ground_is_silent(
 
 def test_a_target_that_is_no_link_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="accepted: serial:"):
-        WatchedLink("udp:nowhere")
+        check_link("udp:nowhere")
 
 
 def test_a_bridge_that_hangs_in_flight_and_is_told_when_it_goes_on(

@@ -1,4 +1,4 @@
-"""Faults of flights of a Crazyflie: twenty in a hover."""
+"""Faults of flights of a Crazyflie: twenty-four in a hover."""
 
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.validation.bridge_session import Session
@@ -33,12 +33,23 @@ def _alone(rig: FlownPeer, session: Session) -> None:
     unheard(rig, session)
 
 
+def _still(rig: FlownPeer, session: Session) -> None:
+    del session
+    rig.stop_watchdog()
+
+
 FAULTS = (
-    Fault("the bridge's process dies", nothing, True, bridge_lives=False, falls=True),
-    Fault("the bridge's process hangs for 0.2 s", nothing, False, (Mode.HOVER,), bridge_lives=False, flies=True,
-          heals_after=0.2),
-    Fault("the bridge's process hangs for 1 s", nothing, True, (Mode.HOVER,), bridge_lives=False, flies=True,
+    Fault("the bridge's process dies", nothing, True, bridge_lives=False),
+    Fault("the bridge's process hangs for 0.1 s", nothing, False, (Mode.HOVER,), bridge_lives=False, flies=True,
+          heals_after=0.1),
+    Fault("the bridge's process hangs for 1 s", nothing, True, (Mode.PILOT, *DOWN), bridge_lives=False,
           heals_after=1.0),
+    Fault("without a watchdog, the process dies", nothing, True, bridge_lives=False, falls=True, watched=False),
+    Fault("without a watchdog, the process hangs for 0.2 s", nothing, False, (Mode.HOVER,), bridge_lives=False,
+          flies=True, heals_after=0.2, watched=False),
+    Fault("without a watchdog, the process hangs for 1 s", nothing, True, (Mode.HOVER,), bridge_lives=False,
+          flies=True, heals_after=1.0, watched=False),
+    Fault("the watchdog's process hangs", _still, True, DOWN, falls=True),
     Fault("the link is gone", wire(alive=False), True, (Mode.PILOT, *DOWN), falls=True),
     Fault("nothing arrives at the Crazyflie", wire(up=False), True, DOWN, falls=True),
     Fault("nothing comes from the Crazyflie", wire(down=False), False, DOWN),

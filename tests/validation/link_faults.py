@@ -29,6 +29,8 @@ class Fault:
     """Whether the vehicle still flies at the end."""
     falls: bool = False
     """Whether the motors stop in the air, as documented: nothing is asked of the touch."""
+    watched: bool = True
+    """Whether the bridge has its watchdog, where there is one for the autopilot."""
     heals_after: float | None = None
     """The fault ends after this time, s. None: it lasts."""
     heal: Callable[[FlownPeer, Session], None] = lambda rig, session: None
@@ -103,8 +105,10 @@ class FaultEnd:
 
 def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
     """Fly into a fault out of a hover, and judge the end."""
+    rig.plan(session.bridge)
     before = len(rig.log)
     fault.begin(rig, session)
+    place = np.array(rig.state.position[:2])
     begun, fastest, alive = rig.now(), 0.0, fault.bridge_lives
     healed, high = fault.heals_after is None, True
     while rig.now() < begun + fault.seconds:
@@ -114,6 +118,7 @@ def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
         sinks = -float(rig.state.velocity[2])
         if alive:
             session.step()
+            rig.plan(session.bridge)
         else:
             rig.sleep(session.period)
         now_high = float(rig.state.position[2]) > rig.world.vehicle.feet_height + 0.01
@@ -122,7 +127,10 @@ def flown(rig: FlownPeer, session: Session, fault: Fault) -> FaultEnd:
     acted = any(line.startswith("failsafe") for line in rig.log[before:])
     down = not high
     mode, tilt = session.bridge.flight.mode, 1 - 2 * float(np.sum(np.square(rig.state.quaternion[1:3])))
-    told = f"{mode}, {'down' if down else 'flies'}, touch {fastest:.2f} m/s, {'; '.join(rig.log[before:])}"
+    aside = float(np.linalg.norm(rig.state.position[:2] - place))
+    told = f"{mode}, {'down' if down else 'flies'}, touch {fastest:.2f} m/s, {aside:.2f} m aside, " + "; ".join(
+        rig.log[before:]
+    )
     good = (
         acted is fault.autopilot_acts
         and down is not fault.flies

@@ -6,6 +6,8 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +21,13 @@ from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.flight.row import problems
 from e2efly.policy.loader import load_policy
 from e2efly.validation.bridge_session import Session, rehearsal_settings
-from e2efly.validation.rehearsal import LINK_S, whole_course, whole_flight
+from e2efly.validation.rehearsal import LINK_S, parked, whole_course, whole_flight
 from e2efly.vehicles.loading import load_vehicle
+from tests.faults.fault_run import TOUCH_SPEED
 from tests.flight.crazyflie_peer import PARAMETERS, CrazyflieRig
+from tests.flight.peer_rig import STEP_S
 from tests.validation.crazyflie_faults import FAULTS
-from tests.validation.link_faults import Fault, flown
+from tests.validation.link_faults import FaultEnd, flown
 from tests.waiting import free_port
 
 VEHICLE = load_vehicle("crazyflie")
@@ -97,23 +101,84 @@ def test_a_policy_flies_its_whole_flight(name: str) -> None:
     assert flight.complete and flight.success, (flight.told, flight.reasons)
 
 
-@pytest.mark.parametrize("fault", FAULTS[:1])
-def test_when_the_process_dies_it_levels_and_falls(fault: Fault) -> None:
+def struck(fault: str, **rig_is: Any) -> tuple[CrazyflieRig, FaultEnd]:
+    """Fly into a fault by its name."""
+    (known,) = (one for one in FAULTS if one.name == fault)
+    with closing(hovering(CrazyflieRig(VEHICLE, latency=0.02, seed=1, watched=known.watched, **rig_is))) as session:
+        rig: Any = session.rig
+        return rig, flown(rig, session, known)
+
+
+def test_when_the_process_dies_it_is_landed_for() -> None:
+    rig, end = struck("the bridge's process dies")
+    assert end.good, end.told
+    assert rig.log == ["flying", "failsafe: landing", "landed", "ready"]
+
+
+def test_without_a_watchdog_it_levels_and_falls() -> None:
     """This is what the firmware does. The check says so, and nothing here softens it."""
-    rig = CrazyflieRig(VEHICLE, latency=0.02, seed=1)
-    session = hovering(rig)
-    end = flown(rig, session, fault)
+    rig, end = struck("without a watchdog, the process dies")
     assert end.good, end.told
     assert rig.log == ["flying", "failsafe: set-points", "level", "locked"]
-    assert any("its motors stop and it falls" in row.value for row in session.autopilot.check(VEHICLE, SETTINGS, None))
 
 
 @pytest.mark.whole
-@pytest.mark.parametrize("fault", FAULTS[1:], ids=lambda fault: fault.name)
-def test_a_fault_ends_as_documented(fault: Fault) -> None:
-    rig = CrazyflieRig(VEHICLE, latency=0.02, seed=1)
-    end = flown(rig, hovering(rig), fault)
+@pytest.mark.parametrize("fault", [fault.name for fault in FAULTS])
+def test_a_fault_ends_as_documented(fault: str) -> None:
+    _, end = struck(fault)
     assert end.good, end.told
+
+
+def test_one_that_knows_no_position_is_landed_level_where_it_drifts_to() -> None:
+    rig, end = struck("the bridge's process dies", values={"stabilizer.estimator": 1})
+    assert end.good, end.told
+    assert rig.poses_seen == 0
+
+
+def test_a_landing_is_asked_for_until_it_is_answered_and_on_the_ground_never() -> None:
+    """Handed over without a landing, the high-level commander would stop the motors in the air."""
+    rig = CrazyflieRig(VEHICLE, latency=0.02, seed=1, watched=True)
+    with closing(hovering(rig)) as session:
+        rig.plan(session.bridge)
+        rig.wire.down = False
+        rig.sleep(0.4)
+        assert "failsafe: landing" in rig.log and rig._streamed  # no answer: set-points keep their priority
+        rig.wire.down = True
+        rig.sleep(0.1)
+        assert not rig._streamed
+        rig.sleep(10.0)
+        assert rig.standing and rig.log[-1] == "ready" and "locked" not in rig.log
+    rig = CrazyflieRig(VEHICLE, latency=0.02, seed=1, watched=True)
+    with closing(Session(rig, SETTINGS, hover=hover_controller("geometric", VEHICLE, 0.03))) as session:
+        rig.set(armed=True)
+        session.fly(0.5)
+        assert session.bridge.inputs.armed
+        rig.plan(session.bridge)
+        rig.sleep(3.0)
+        assert rig.standing and "failsafe: landing" not in rig.log
+
+
+@pytest.mark.whole
+def test_one_that_races_is_landed_through_a_radio_that_loses_packets() -> None:
+    policy = load_policy("crazyflie/race")
+    course = whole_course(policy, VEHICLE)
+    rig = CrazyflieRig(VEHICLE, latency=0.02, seed=3, watched=True)
+    rig.state = parked(rig.world, course, 3)
+    hover = hover_controller("geometric", VEHICLE, 0.03)
+    with closing(Session(rig, SETTINGS, policy=policy, course=course, hover=hover)) as session:
+        assert session.take_off(1.0), session.bridge.flight.reasons
+        rig.set(mission="policy")
+        session.fly(3.0)
+        rig.plan(session.bridge)
+        assert np.linalg.norm(rig.state.velocity) > 1.5 and session.bridge.flight.mode is Mode.POLICY
+        rig.wire.loss = 0.3
+        fastest = 0.0
+        for _ in range(8000):
+            if not rig.standing:
+                fastest = -float(rig.state.velocity[2])
+            rig.sleep(STEP_S)
+        assert rig.standing and fastest < TOUCH_SPEED
+        assert rig.log[1:] == ["failsafe: landing", "landed", "ready"]
 
 
 def test_each_parameter_that_would_harm_is_named() -> None:
@@ -180,7 +245,10 @@ def test_over_udp_the_check_lists_what_matters(served: int, capsys: pytest.Captu
     code = fly_command(Fly(vehicle="crazyflie", link=link, pose=f"udp:{free_port()}", check=True))
     told = capsys.readouterr().out
     assert code == 1  # there are no poses
-    for words in ("Crazyflie 2.1 2026.08, CRTP 12", "motors stop and it falls", "1: PID", "3.95 V per cell"):
+    for words in (
+        "Crazyflie 2.1 2026.08, CRTP 12", "motors stop and it falls", "has the firmware land it", "1: PID",
+        "3.95 V per cell",
+    ):  # fmt: skip
         assert words in told, told
 
 

@@ -4,18 +4,21 @@ import time
 
 from e2efly.config.registry import check_methods, load, referenced
 from e2efly.flight.autopilot import METHODS, Autopilot
+from e2efly.flight.betaflight import watchdog as betaflight_watchdog
 from e2efly.flight.betaflight.autopilot import AIDING_SCHEDULE, EXCITATION_SCHEDULE, Betaflight, check_hover
 from e2efly.flight.betaflight.client import SCHEDULE
-from e2efly.flight.betaflight.watchdog import WatchedLink
+from e2efly.flight.crazyflie import crazyflie_watchdog
 from e2efly.flight.crazyflie.crazyflie_autopilot import Crazyflie
 from e2efly.flight.crazyflie.crtp_link import CRAZYFLIE, RADIO, open_crtp
 from e2efly.flight.crazyflie.words import Words
 from e2efly.flight.descent_plan import DescentWatchdog
 from e2efly.flight.flight_loop import Watchdog
+from e2efly.flight.landing_plan import LandingWatchdog
 from e2efly.flight.link import Link, open_link
 from e2efly.flight.mavlink.mavlink import Mavlink
 from e2efly.flight.pilot.hovering import ROTOR_SPEED, HoverController
 from e2efly.flight.settings import FlightSettings
+from e2efly.flight.watched_link import WatchedLink
 from e2efly.vehicles.vehicle import Vehicle
 
 MAVLINK = "mavlink:"
@@ -58,7 +61,7 @@ def open_autopilot(
     if target.startswith(MAVLINK):
         return _mavlink(target, settings, hover), None
     if target.startswith((CRAZYFLIE, RADIO)):
-        return _crazyflie(target, vehicle, settings, hover), None
+        return _crazyflie(target, vehicle, settings, hover, watched=watched)
     if (own := referenced(target)) is not None:
         made = load(own[0])(own[1], settings)
         check_methods(made, METHODS)
@@ -68,7 +71,8 @@ def open_autopilot(
             made.close()
             raise
         return made, None
-    held: Link = WatchedLink(target) if watched else open_link(target)
+    program, timeout = betaflight_watchdog.PROGRAM, betaflight_watchdog.TIMEOUT_S
+    held: Link = WatchedLink(program, target, timeout) if watched else open_link(target)
     try:
         _connect(held, target)
         schedule = AIDING_SCHEDULE if aids else EXCITATION_SCHEDULE if excited else SCHEDULE
@@ -114,21 +118,23 @@ def _mavlink(target: str, settings: FlightSettings, hover: tuple[str, HoverContr
 
 
 def _crazyflie(
-    target: str, vehicle: Vehicle, settings: FlightSettings, hover: tuple[str, HoverController]
-) -> Autopilot:
-    """A Crazyflie, whose pilot types into this terminal. Its firmware decides alone what happens when commands end."""
+    target: str, vehicle: Vehicle, settings: FlightSettings, hover: tuple[str, HoverController], *, watched: bool
+) -> tuple[Autopilot, Watchdog | None]:
+    """A Crazyflie, whose pilot types into this terminal. Without a watchdog, it falls when commands end."""
     if ROTOR_SPEED in hover[1].needs:
         raise ValueError(
             f"--hover is {hover[0]!r}, which needs the speeds of the rotors, and a Crazyflie tells none; accepted: "
             "geometric, mpc or pid"
         )
-    held = open_crtp(target)
+    program, timeout = crazyflie_watchdog.PROGRAM, crazyflie_watchdog.TIMEOUT_S
+    held: Link = WatchedLink(program, target, timeout) if watched else open_crtp(target)
     try:
         _connect(held, target)
-        return Crazyflie.connect(held, vehicle, settings, Words(), CONNECT_S)
+        autopilot = Crazyflie.connect(held, vehicle, settings, Words(), CONNECT_S)
     except BaseException:
         held.close()
         raise
+    return autopilot, LandingWatchdog(held) if isinstance(held, WatchedLink) else None
 
 
 def _connect(link: Link, target: str) -> None:

@@ -10,10 +10,11 @@ from e2efly.flight.betaflight.autopilot import Betaflight
 from e2efly.flight.betaflight.descent import Sense
 from e2efly.flight.betaflight.instruments import CLOSED
 from e2efly.flight.betaflight.sticks import Sticks
-from e2efly.flight.betaflight.watchdog import DescentPlan, WatchedLink
+from e2efly.flight.betaflight.watchdog import DescentPlan
 from e2efly.flight.bridge import Bridge
 from e2efly.flight.pilot.flight_state import GROUNDED, Mode
 from e2efly.flight.pilot.hover import blind, blind_time, sink_time
+from e2efly.flight.watched_link import WatchedLink
 from e2efly.vehicles.gravity import GRAVITY
 
 PLAN_RATES = tuple(0.5 * i for i in range(-6, 7))

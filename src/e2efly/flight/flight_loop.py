@@ -31,7 +31,7 @@ each thread sometimes holds the interpreter's lock, and the loop would then have
 thread's core."""
 STATUS_PERIOD = 1.0
 """The period of the status lines, s."""
-TAKEN = "; it keeps the link until you disarm: then end this by Ctrl-C and start it anew"
+TAKEN = "; it keeps the link until its landing is over: then end this by Ctrl-C and start it anew"
 """Said once the watchdog has taken over, after the watchdog's reason."""
 
 

@@ -1,24 +1,17 @@
-"""A separate process between bridge and flight controller, which lands the vehicle when the bridge dies or hangs.
+"""The watchdog of a flight over Betaflight: how it lands the vehicle when the bridge dies or hangs.
 
 Under MSP override, Betaflight continues with the last sticks that it received. Some versions do so for ever, others for
-0.3 s. After that the pilot's own sticks are used, but the pilot may not be holding them. So the link belongs to this
-small process, which passes all bytes on. When the bridge has ended, or has been silent for `TIMEOUT_S` in flight, this
-process takes over for good. It levels the vehicle with the controller's own attitude and descends gently with the
-throttle that the bridge had learned. Then it keeps the throttle closed until the pilot disarms. It imports neither
-NumPy nor ONNX Runtime. It ends only with the bridge: no signal but SIGKILL stops it.
+0.3 s. After that the pilot's own sticks are used, but the pilot may not be holding them. So the link belongs to a small
+process (`watched_link.py`). When the bridge has ended, or has been silent for `TIMEOUT_S` in flight, this process takes
+over for good. It levels the vehicle with the controller's own attitude and descends gently with the throttle that the
+bridge had learned. Then it keeps the throttle closed until the pilot disarms.
 """
 
 import json
-import os
-import select
-import signal
-import socket
-import subprocess
-import sys
 import time
 from bisect import bisect_right
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import chain, pairwise
 from math import inf
 from typing import Any
@@ -35,17 +28,16 @@ from e2efly.flight.betaflight.messages import (
     StatusEx,
     set_raw_rc,
 )
-from e2efly.flight.lifeline import Lifeline, watch
 from e2efly.flight.link import MOST, Link, open_link
+from e2efly.flight.watched_link import watch_over
 from e2efly.vehicles.gravity import GRAVITY
 
+PROGRAM = "e2efly.flight.betaflight.watchdog"
+"""This module, which runs as a process."""
 TIMEOUT_S = 0.1
 """Silence of the bridge in flight after which this process takes over, s."""
 PERIOD_S = 0.01
 """Time between two frames of a take-over, s."""
-STALL_S = 0.05
-"""The longest time that one loop of this process may add to the silence of the bridge, s. If the whole machine stood
-still, the bridge then has the chance to send first."""
 STALE_S = 0.2
 """A controller's attitude that is older than this is not used for levelling, s."""
 DEAF_S = 10.0
@@ -61,13 +53,6 @@ LEVEL_GAIN = 4.0
 """Body rate divided by tilt, 1/s."""
 LEVEL_RATE = 3.0
 """Largest body rate of levelling, rad/s."""
-BYTES, PLAN, STATUS, TAKEN = b"B", b"P", b"S", b"T"
-"""First byte of a packet: bytes of the link, the plan of the bridge, the state of the link, or the message that this
-process has taken over."""
-PACKETS = 64
-"""The largest number of packets that the bridge reads from this process at a time."""
-_PACKET = 1 << 17
-"""The longest packet, bytes. It is longer than what a link delivers at a time."""
 
 
 @dataclass(frozen=True)
@@ -132,167 +117,6 @@ def _channels(
         channels[place] = round(between(plan.rates, pulses, rate))
     channels[plan.places[3]] = throttle
     return channels
-
-
-class WatchedLink:
-    """The bridge's side: a `Link` through the watchdog process. It works as long as the thread that creates it lives.
-
-    Raises:
-        ValueError: the target does not name a link.
-    """
-
-    def __init__(self, target: str, timeout: float = TIMEOUT_S) -> None:
-        """Start the process. `target` is the text of the link, as for `open_link`. `timeout` is the silence of the
-        bridge in flight after which the process takes over, s.
-        """
-        open_link(target)  # raises here for a bad target; nothing is opened before the first poll
-        self.connections, self.reason = 0, "not polled yet"
-        self.taken_over = ""
-        """Why the watchdog has taken over. Empty: it has not."""
-        self._link_alive = False
-        mine, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        for end in (mine, other):
-            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
-        mine.setblocking(False)
-        self._lifeline: Lifeline | None = None
-        with suppress(OSError):  # on other systems than Linux, the socket shows the bridge's death some ms later
-            self._lifeline = Lifeline()
-        given = [other.fileno(), *([self._lifeline.descriptor] if self._lifeline else [])]
-        with other:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "e2efly.flight.betaflight.watchdog", target, str(timeout), *map(str, given)],
-                pass_fds=given,
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C must reach only the bridge
-            )
-        self._socket = mine
-        self._received = bytearray()
-
-    @property
-    def alive(self) -> bool:
-        """Whether the controller is connected and the bridge is still in control."""
-        return self._link_alive and not self.taken_over
-
-    def poll(self, now: float) -> None:
-        """Read what the watchdog reports. It connects by itself."""
-        del now
-        if not self._link_alive and not self.taken_over:
-            self._hand(BYTES)  # nothing is sent on a link that is gone, and silence would be the end of the bridge
-        for _ in range(PACKETS):
-            try:
-                packet = self._socket.recv(_PACKET)
-            except BlockingIOError:
-                return
-            except OSError as error:
-                packet, self.reason = b"", str(error)
-            if not packet:
-                self._link_alive = False
-                self.reason = self.taken_over or "the watchdog process has ended"
-                self._process.poll()
-                return
-            kind, content = packet[:1], packet[1:]
-            if kind == BYTES:
-                self._received += content
-            elif kind == STATUS:
-                self._link_alive, self.reason, self.connections = json.loads(content)
-            elif kind == TAKEN:
-                self.taken_over = self.reason = f"the watchdog has taken over: {content.decode()}"
-
-    def send(self, data: bytes) -> None:
-        """Send bytes to the controller."""
-        self._hand(BYTES + data)
-
-    def receive(self) -> bytes:
-        """The bytes from the controller."""
-        self.poll(0.0)
-        data = bytes(self._received)
-        self._received.clear()
-        return data
-
-    def plan(self, plan: DescentPlan) -> None:
-        """Tell the watchdog what to do if the bridge falls silent."""
-        self._hand(PLAN + json.dumps(asdict(plan)).encode())
-
-    def close(self) -> None:
-        """End the watchdog, if the vehicle is on the ground. In the air, the watchdog treats this as the end of the
-        bridge, and lands.
-        """
-        self._socket.close()
-        if self._lifeline:
-            self._lifeline.close()
-        self._link_alive = False
-        with suppress(subprocess.TimeoutExpired):  # it is landing the vehicle
-            self._process.wait(2.0)
-
-    def _hand(self, packet: bytes) -> None:
-        try:
-            self._socket.send(packet)
-        except OSError as error:
-            self.reason = f"the watchdog process does not listen: {error}"
-
-
-def serve(bridge: socket.socket, died: socket.socket | None, link: Link, timeout: float = TIMEOUT_S) -> str:
-    """Pass bytes on until the bridge ends on the ground, or take over and land.
-
-    Args:
-        bridge: the socket to the bridge. When it is closed, the bridge has ended.
-        died: a socket that becomes readable when the bridge has died, earlier than `bridge` closes (see `lifeline`).
-            None: there is none.
-        link: the link to the controller.
-        timeout: silence of the bridge in flight after which it counts as ended, s.
-
-    Returns:
-        Why this process has landed the vehicle. Empty: the bridge ended on the ground.
-    """
-    heard = [bridge] if died is None else [bridge, died]
-    plan: DescentPlan | None = None
-    status: tuple[bool, str, int] | None = None
-    silence, before, held = 0.0, time.monotonic(), b""
-    planned = before
-    bridge.setblocking(False)
-    while True:
-        ready, _, _ = select.select(heard, [], [], 0.001)
-        now = time.monotonic()
-        silence, before = silence + min(now - before, STALL_S), now
-        link.poll(now)
-        packets, gone = _packets(bridge)
-        gone = gone or died in ready
-        for packet in packets:
-            silence = 0.0
-            if packet[:1] == BYTES:
-                link.send(packet[1:])
-                held = packet[1:] if packet[5:6] == bytes([SET_RAW_RC]) else held
-            else:
-                plan, planned = _plan(packet[1:]) or plan, now
-        flying = plan is not None and plan.flying
-        if gone and not flying:
-            link.close()
-            return ""
-        if plan is not None and flying and (gone or silence > timeout):
-            why = "the bridge has ended" if gone else f"the bridge was silent for {silence:.2f} s"
-            _hand(bridge, TAKEN + why.encode())
-            land(link, plan, held, now - planned)
-            return f"{why}: landed"
-        if data := link.receive():
-            _hand(bridge, BYTES + data)
-        said = link.alive, link.reason, link.connections
-        if said != status and _hand(bridge, STATUS + json.dumps(said).encode()):
-            status = said
-
-
-def _packets(bridge: socket.socket) -> tuple[list[bytes], bool]:
-    """The packets that have come, and whether the bridge has ended."""
-    packets = []
-    while True:
-        try:
-            packet = bridge.recv(_PACKET)
-        except BlockingIOError:
-            return packets, False
-        except OSError:
-            packet = b""
-        if not packet:
-            return packets, True
-        packets.append(packet)
 
 
 def land(link: Link, plan: DescentPlan, held: bytes = b"", age: float = 0.0) -> None:
@@ -372,31 +196,34 @@ def _plan(content: bytes) -> DescentPlan | None:
         return None
 
 
-def _hand(bridge: socket.socket, packet: bytes) -> bool:
-    try:
-        bridge.send(packet)
-    except OSError:  # full or closed: bytes of the controller are lost, as on a bad line
-        return False
-    return True
+@dataclass
+class StickLander:
+    """Lands over MSP override, by the newest plan of the bridge."""
 
+    plan: DescentPlan | None = None
+    planned: float = 0.0
+    """When `plan` came, s."""
+    held: bytes = b""
+    """The last stick frame of the bridge."""
 
-def main() -> None:
-    """Serve the bridge over a link.
+    @property
+    def flying(self) -> bool:
+        """Whether silence of the bridge leads to a take-over."""
+        return self.plan is not None and self.plan.flying
 
-    The arguments of the process are the text of the link, the timeout in s, the file descriptor of the socket to the
-    bridge and, if there is one, that of its lifeline.
-    """
-    target, timeout, descriptor, *lifeline = sys.argv[1:]
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    with suppress(OSError, AttributeError):  # without the permission for it, the process is still light enough
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))  # a bridge that spins must not starve it
-    with socket.socket(fileno=int(descriptor)) as bridge:
-        died = watch(int(lifeline[0])) if lifeline else None
-        said = serve(bridge, died, open_link(target), float(timeout))
-    with suppress(OSError):  # maybe nobody reads this, so it comes only after the landing
-        sys.stderr.write(f"watchdog: {said}\n" if said else "")
+    def passed(self, data: bytes) -> None:
+        """Bytes of the bridge have been passed on."""
+        self.held = data if data[4:5] == bytes([SET_RAW_RC]) else self.held
+
+    def follow(self, content: bytes) -> None:
+        """Take a new plan. One that cannot be read leaves the last one."""
+        self.plan, self.planned = _plan(content) or self.plan, time.monotonic()
+
+    def land(self, link: Link) -> None:
+        """Land, until the pilot has disarmed."""
+        if self.plan is not None:
+            land(link, self.plan, self.held, time.monotonic() - self.planned)
 
 
 if __name__ == "__main__":
-    main()
+    watch_over(open_link, StickLander())

@@ -1,8 +1,8 @@
 """A Crazyflie as the bridge's autopilot: body rates and thrust by the generic commander's manual set-points.
 
 These need no parameter and no unlocking: body rates, thrust and the mode are in each packet. A Crazyflie has no
-receiver: its pilot types words (`words.py`). It has no landing of its own for the loss of this program: its firmware
-levels after 0.5 s, and stops the motors after 2 s.
+receiver: its pilot types words (`words.py`). Its firmware has no landing for the loss of set-points: it levels after
+0.5 s, and stops the motors after 2 s. For the loss of this program there is `crazyflie_watchdog.py`.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Any
 from e2efly.flight.attitude import Attitude, attitude_of
 from e2efly.flight.autopilot import HOLE, AutopilotState, InertialReading, Outgoing
 from e2efly.flight.clock import MONOTONIC, Clock
-from e2efly.flight.crazyflie.crazyflie_needs import BEHAVIOUR, NEEDS, PROTOCOL, firmware_row
+from e2efly.flight.crazyflie.crazyflie_needs import NEEDS, PROTOCOL, behaviour, firmware_row
 from e2efly.flight.crazyflie.crtp import FULL, LOGS, PARAMETERS, arming, external_pose, setpoint
 from e2efly.flight.crazyflie.crtp_station import CrtpStation, LogBlock
 from e2efly.flight.crazyflie.words import TypedWish, Wishes
@@ -144,7 +144,7 @@ class Crazyflie:
         return (
             firmware_row(self.protocol, self.firmware),
             *(need.row(self.parameters) for need in NEEDS),
-            *BEHAVIOUR,
+            *behaviour(self.parameters),
         )
 
     def poll(self, now: float) -> None:

@@ -65,22 +65,31 @@ NEEDS = (
     NeededParameter("locSrv.extQuatStdDev", lambda value: 0 < value <= 0.5, "at most 0.5 rad: the same for attitudes"),
 )  # fmt: skip
 """The parameters that are read."""
-BEHAVIOUR = (
-    Row(
-        "this program dies",
-        f"holds the last rates for {LEVEL_S:g} s, then level with the last thrust; {OFF_S:g} s after the last command "
-        "its motors stop and it falls; locked until it is switched off",
-        "read it: the firmware has no landing for this, so fly low, over something soft",
-        True,
-    ),
-    Row("the link is lost", "as when this program dies", "the same", True),
-    Row("the poses end", "this program lands it by accelerometer, attitude and thrust", "any", True),
-    Row(
-        "the pilot", "this terminal: arm, hover, policy, off (motors stop), each with Enter; any other line lands",
-        "somebody at this terminal who watches the vehicle", True,
-    ),
-)  # fmt: skip
-"""What no parameter changes."""
+
+
+def behaviour(parameters: Mapping[str, float]) -> tuple[Row, ...]:
+    """What it does when program, link or poses end, as rows of the table."""
+    by = {
+        1: "level and by the barometer; it drifts",
+        2: "by its own position: without one from on board, it drifts",
+    }.get(int(parameters.get("stabilizer.estimator", 0)), "by its own position")
+    return (
+        Row(
+            "this program dies", f"its watchdog has the firmware land it, {by}. With --no-watchdog: as below",
+            "room to land below the flight", True,
+        ),
+        Row(
+            "the link is lost",
+            f"holds the last rates for {LEVEL_S:g} s, then level with the last thrust; {OFF_S:g} s after the last "
+            "command its motors stop and it falls; locked until it is switched off",
+            "read it: the firmware has no landing for this, so fly low, over something soft", True,
+        ),
+        Row("the poses end", "this program lands it by accelerometer, attitude and thrust", "any", True),
+        Row(
+            "the pilot", "this terminal: arm, hover, policy, off (motors stop), each with Enter; any other line lands",
+            "somebody at this terminal who watches the vehicle", True,
+        ),
+    )  # fmt: skip
 
 
 def firmware_row(protocol: int, firmware: str) -> Row:

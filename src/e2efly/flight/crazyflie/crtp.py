@@ -11,16 +11,9 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-PARAMETERS, COMMANDER, LOGS, LOCALIZATION, GENERIC_COMMANDER, SUPERVISOR, PLATFORM, LINK_SERVICE = (
-    2,
-    3,
-    5,
-    6,
-    7,
-    9,
-    13,
-    15,
-)
+PARAMETERS, LOGS, LOCALIZATION, GENERIC_COMMANDER, HIGH_LEVEL, SUPERVISOR, PLATFORM, LINK_SERVICE = (
+    2, 5, 6, 7, 8, 9, 13, 15,
+)  # fmt: skip
 """Ports."""
 NOTHING = 0xF3
 """A header with these bits carries nothing: it only asks for an answer, or is one."""
@@ -28,6 +21,10 @@ LARGEST = 30
 """Most bytes after the header."""
 MANUAL, EXTERNAL_POSE = 11, 8
 """Types of a set-point of rates and thrust, and of a pose."""
+LAND = 10
+"""The high-level commander's landing with a speed. Its answers repeat this number."""
+SET_POINTS_END = 0
+"""A command to the generic commander: no set-points follow."""
 FULL = 65535
 """Largest thrust of a set-point."""
 
@@ -82,6 +79,20 @@ def setpoint(rates: tuple[float, float, float], thrust: int) -> CrtpPacket:
     """Body rates, rad/s, and thrust, 0 (motors stopped) to 65535. The firmware's pitch is opposite to FLU's."""
     p, q, r = (math.degrees(rate) for rate in rates)
     return CrtpPacket(GENERIC_COMMANDER, 0, struct.pack("<BfffHB", MANUAL, p, 0.0 - q, r, thrust, 1))
+
+
+def landing(descent: float, speed: float) -> CrtpPacket:
+    """The request to the high-level commander to land where the vehicle is: `descent` m down, at a mean speed, m/s,
+    with the yaw that it has.
+    """
+    every_group, relative, own_yaw = 0, True, True
+    data = struct.pack("<BBf?f?f", LAND, every_group, descent, relative, 0.0, own_yaw, speed)
+    return CrtpPacket(HIGH_LEVEL, 0, data)
+
+
+def set_points_end() -> CrtpPacket:
+    """Hand priority over to the high-level commander. Its set-points count until another packet brings one."""
+    return CrtpPacket(GENERIC_COMMANDER, 1, struct.pack("<BI", SET_POINTS_END, 0))
 
 
 def external_pose(position: Sequence[float], quaternion: Sequence[float]) -> CrtpPacket:
