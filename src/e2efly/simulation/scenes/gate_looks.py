@@ -135,7 +135,7 @@ def coloured(
         sky = label == SKY
         x = jnp.where(sky, 3 * jnp.arctan2(ahead[1], ahead[0]), jnp.where(level, point[0], along))
         y = jnp.where(sky, 3 * ahead[2] / jnp.hypot(ahead[0], ahead[1]), jnp.where(level, point[1], point[2]))
-        row = jnp.select([label == which for which in CLASSES], jnp.arange(len(CLASSES)))
+        row = jnp.select([label == which for which in CLASSES], list(range(len(CLASSES))))
         share = jnp.zeros(label.shape)
         for k, which in enumerate(CLASSES):
             here = label == which
