@@ -5,7 +5,7 @@
 
 `--train` learns so many steps from the pictures that `gate_renders.py` left in a folder, and writes the file; without
 it the file is measured. `--more N` begins from the file that is there, in another order for each N. It is measured in
-the looks of the training and in `UNSEEN` ones, of which neither textures, light, bars, panels nor seeds are the
+the looks of the training and in `UNSEEN` ones, of which neither textures, sun, bars, panels nor seeds are the
 training's; or in those that `--looks` names. Then `eyes.py --colours gates.onnx` flies by it.
 A corner is one that can be seen in the true mask. It is found if a corner of the network's mask that opens the same way
 lies within 10 pixels. A gate can be seen if two of its corners can, and is found if two of them are.

@@ -19,7 +19,7 @@ OTHERS = (
     "firmware_faults", "command_flights", "controllers", "fault_campaign --publish", "process_faults", "bridge_loop",
     "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
     "multirotor", "eyes", "eyes --rows --flights 40", "eyes --firmware 5",
-    "gate_renders", "gate_masks --train 4850", "eyes --colours gates.onnx --flights 16", "exchanges",
+    "gate_renders", "gate_masks --train 4850", "eyes --colours gates.onnx", "exchanges",
     "identify", "identify --plant structure --bare --first 1010", "step_response",
     "step_alignment", "step_alignment --plant betaflight --vehicles 6",
 )  # fmt: skip

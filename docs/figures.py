@@ -204,7 +204,7 @@ with noise and biases. Tracks on MuJoCo; then rows that the estimator was not ma
 the stress test; last, whole flights through the real firmware. [How it is done](eyes.md).""",
     "gate_masks": """
 Whole pictures of 640 x 360 pixels, gates among poles, beams, blocks and walls. Of the looks kept apart, neither
-textures nor light, bars, panels and seeds are those of the training. A gate can be seen if two corners of its opening
+textures nor sun, bars, panels and seeds are those of the training. A gate can be seen if two corners of its opening
 can, and is found if two of them are, within 10 pixels. The median error counts what is not found as infinite.
 [Racing from colours](eyes.md#from-colours).""",
     "step_response": """
