@@ -1,14 +1,15 @@
 """Races by a camera and an IMU alone: the pose source `gates:` under the zoo's race policies, as they are.
 
-    python benchmarks/eyes.py [--flights 50] [--seed 9000000] [--rows | --colours ONNX | --firmware 5]
+    python benchmarks/eyes.py [--flights 50] [--seed 9000000] [--rows | --firmware 5]
+    python benchmarks/eyes.py --colours gates.onnx [--looks FILE.py:NAME]
 
 On MuJoCo, on four tracks of twice their size, on which such races are fast, and on random tracks. Each flight draws the
 mounting of its camera (2 degrees), the age of its images (20 to 60 ms, of which the estimator knows the middle), a
 rolling shutter of 16 ms, lost images (5 %), the places of the gates (2 cm from the map), and the errors of its IMU.
 With `--rows`, rows that the estimator was not made for, and the vehicles of the stress test. With `--colours FILE`, a
-camera that gives colours: the world has looks that are kept apart from the training of `gate_masks.py`, and every image
-passes through the network in that file. With `--firmware`, whole flights through the real Betaflight firmware, whose
-IMU comes by MSP. Parts that are not asked for stay as they are in the file.
+camera that gives colours: the world has looks that are kept apart from the training of `gate_masks.py`, or those that
+`--looks` names, and every image passes through the network in that file. With `--firmware`, whole flights through the
+real Betaflight firmware, whose IMU comes by MSP. Parts that are not asked for stay as they are in the file.
 """
 
 import dataclasses
@@ -22,10 +23,12 @@ from typing import Any
 import numpy as np
 from common import RESULTS, arguments, table, write
 
+from e2efly.config.registry import load
 from e2efly.courses.tracks import load_track, track_text
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.simulation.device import compute_at_once, prepare
+from e2efly.simulation.scenes.gate_looks import KEPT_APART
 from e2efly.tasks.route import usual_route
 from e2efly.validation import firmware_program
 from e2efly.validation.gate_pose import RACER, GateCamera
@@ -58,7 +61,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 def main() -> None:
     """Fly, print the tables, write the figures."""
-    args = arguments(__doc__ or "", flights=50, seed=9_000_000, rows=False, colours="", firmware=0)
+    args = arguments(__doc__ or "", flights=50, seed=9_000_000, rows=False, colours="", looks="", firmware=0)
     compute_at_once()
     prepare("cpu")
     path = args.json or RESULTS / "eyes.json"
@@ -70,8 +73,9 @@ def main() -> None:
             parts["conditions"] = [condition(name, setup, args.flights, args.seed) for name, setup in setups.items()]
             parts["stress"] = stressed(args.flights // 4, args.seed)
         elif args.colours:
-            setup = GateCamera(colours=f"onnx:{args.colours}")
-            parts["colours"] = [condition("from colours, looks kept apart", setup, args.flights, args.seed)]
+            looks, name = (load(args.looks).looks, args.looks) if args.looks else (KEPT_APART, "looks kept apart")
+            setup = GateCamera(colours=f"onnx:{args.colours}", looks=looks)
+            parts["colours"] = [condition(f"from colours, {name}", setup, args.flights, args.seed)]
         elif args.firmware:
             parts["firmware"] = firmware(args.firmware, args.seed)
         else:

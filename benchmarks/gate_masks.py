@@ -1,10 +1,12 @@
 """A network of gates: its training on rendered pictures, and what it finds in looks that were kept apart.
 
-    python benchmarks/gate_masks.py --file gates.onnx [--train 800] [--pictures 1600] [--more 0] [--unseen 256]
+    python benchmarks/gate_masks.py --file gates.onnx [--train 4000] [--folder gate_pictures] [--more 0] [--unseen 256]
+        [--looks FILE.py:NAME]
 
-`--train` learns so many steps and writes the file; without it the file is measured. `--more N` begins from the file
-that is there, with other pictures for each N. Then `eyes.py --colours gates.onnx` flies by it.
-Textures, light, bars, panels and seeds of the unseen pictures are none of the training's: `gate_renders`.
+`--train` learns so many steps from the pictures that `gate_renders.py` left in a folder, and writes the file; without
+it the file is measured. `--more N` begins from the file that is there, in another order for each N. It is measured in
+the looks of the training and in `UNSEEN` ones, of which neither textures, sun, bars, panels nor seeds are the
+training's; or in those that `--looks` names. Then `eyes.py --colours gates.onnx` flies by it.
 A corner is one that can be seen in the true mask. It is found if a corner of the network's mask that opens the same way
 lies within 10 pixels. A gate can be seen if two of its corners can, and is found if two of them are.
 """
@@ -17,17 +19,16 @@ import cv2
 import numpy as np
 import onnx
 from common import arguments, table, write
-from e2efly.flight.pose.gates.gate_corners import Corners, gate_corners
-from gate_renders import CROP, LEARNED, UNSEEN, Pictures, Variety, pictures
-from mask_network import GATES, graph, learned, weights_of
+from gate_renders import LEARNED, SIZE, UNSEEN, Pictures, Variety, pictures, stored
+from mask_network import GATES, Unet, graph, learned, loaded
 
+from e2efly.config.registry import load
 from e2efly.flight.pose.gates.error_state import ALIKE
-from e2efly.flight.pose.gates.lens import NEAREST
+from e2efly.flight.pose.gates.lens import NEAREST, Corners
+from e2efly.flight.sight.gate_corners import gate_corners
 from e2efly.flight.sight.segment.network import MaskNetwork
 from e2efly.validation.gate_pose import RACER, GateCamera
 
-SIZE = (176, 320)
-"""Rows and columns of the pictures that the network takes."""
 LENS = GateCamera(RACER, readout=0.0).lens
 DISTANCES = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 13.0)
 """Bounds of the table's rows, m."""
@@ -36,18 +37,6 @@ NEAR, SAME = 10.0, 3.0
 mask, pixels."""
 RUNS = 300
 """For the time of a run."""
-
-
-def smaller(p: Pictures) -> tuple[np.ndarray, np.ndarray]:
-    """Colours and masks at the network's scale. What was 0 or 1 becomes a share, so edges stay where they are to a part
-    of a pixel.
-    """
-    side = CROP * SIZE[1] // RACER.width
-    colours, masks = (
-        np.stack([cv2.resize(x, (side, side), interpolation=cv2.INTER_AREA) for x in each])
-        for each in (p.colours, p.masks.astype(np.float32))
-    )
-    return colours, masks
 
 
 def errors(found: Corners, pixel: np.ndarray, inward: np.ndarray) -> np.ndarray:
@@ -126,16 +115,17 @@ def times(file: Path) -> dict[str, float]:
 
 def main() -> None:
     """Train where it is asked for, measure, print the table, write the figures."""
-    args = arguments(__doc__ or "", file="gates.onnx", train=0, pictures=1600, more=0, unseen=256)
+    args = arguments(__doc__ or "", file="gates.onnx", train=0, folder="gate_pictures", more=0, unseen=256, looks="")
     file = Path(args.file)
     if args.train:
-        before = weights_of(GATES, onnx.load(file)) if args.more else None
-        colours, masks = smaller(pictures(1 + 10 * args.more, args.pictures, LEARNED))
-        weights = learned(
-            GATES, colours, masks, args.train, size=16, weights=before, upright=True, seed=args.more
-        )  # fmt: skip
-        file.write_bytes(graph(GATES, weights, SIZE).SerializeToString())
+        network, rate = (loaded(GATES, onnx.load(file)), 1e-3) if args.more else (Unet(GATES), 4e-3)
+        colours, masks = stored(Path(args.folder))
+        learned(network, colours, masks, args.train, 16, rate, args.more, upright=True, painted=0.2)
+        file.write_bytes(graph(network, SIZE).SerializeToString())
         print(f"{file}: {file.stat().st_size} bytes")
+    if args.looks:
+        print(table(measured(args.looks, file, args.unseen, 2, load(args.looks))))
+        return
     rows = measured("of the training's kinds, other seeds", file, args.unseen // 2, 2, LEARNED)
     rows += measured("kept apart", file, args.unseen, 3, UNSEEN)
     print(table(rows))

@@ -1,26 +1,38 @@
 """Random pictures of racing gates with the mask of each: what the network `gates` of `mask:onnx` learns from.
 
+    python benchmarks/gate_renders.py [--folder gate_pictures] [--pictures 8192] [--seed 1000] [--looks FILE.py:NAME]
+
 Gates of random width, bars, depth and distance stand on legs or in the air, some with a panel, one behind another,
 among poles, beams, blocks and walls that are no gates. `gate_looks` paints them. `UNSEEN` has bars, panels and looks
-that `LEARNED` lacks.
+that `LEARNED` lacks, and `TRIED` has other textures than both. The pictures are kept in a folder, to which another run
+with another seed adds. `--looks` names a `Variety` of one's own.
 """
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from common import arguments
 
+from e2efly.config.registry import load
 from e2efly.flight.pose.gates.lens import Openings
+from e2efly.flight.sight.segment import opencv
 from e2efly.simulation.physics.rotation import from_euler
+from e2efly.simulation.scenes import gate_looks
 from e2efly.simulation.scenes.camera import Mount, mounted
 from e2efly.simulation.scenes.gate_looks import KEPT_APART, SEEN, LookFamily, coloured, drawn, photographed
 from e2efly.simulation.scenes.scene import GATE, Scene, Solids, join
 from e2efly.validation.gate_pose import RACER
 
-CROP = 192
+CROP = 320
 """Rows and columns of a picture to learn from."""
+SIZE = (176, 320)
+"""Rows and columns of the whole pictures that the network takes."""
+TOGETHER = 256
+"""Pictures of a file."""
 GATES, CLUTTER = 4, 9
 BATCH = 16
 """Pictures that are drawn at once."""
@@ -38,6 +50,7 @@ class Variety:
 
 
 LEARNED = Variety(SEEN, ((0.08, 0.18),), "above")
+TRIED = dataclasses.replace(LEARNED, looks=gate_looks.TRIED)
 UNSEEN = Variety(KEPT_APART, ((0.06, 0.08), (0.18, 0.28)), "beside")
 
 
@@ -181,3 +194,42 @@ def _rotations(angles: np.ndarray) -> np.ndarray:
         [-e, b * d, b * a],
     ]
     return np.moveaxis(np.array(rows), -1, 0)
+
+
+def smaller(p: Pictures) -> tuple[np.ndarray, np.ndarray]:
+    """Colours and masks of windows at the network's scale, 255 for 1. What was 0 or 1 becomes a share, so edges stay
+    where they are to a part of a pixel.
+    """
+    cv2, side = opencv(), CROP * SIZE[1] // RACER.width
+    colours, masks = (
+        np.stack([cv2.resize(x, (side, side), interpolation=cv2.INTER_AREA) for x in each])
+        for each in (p.colours, 255 * p.masks)
+    )
+    return colours, masks
+
+
+def stored(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """All colours and masks of a folder.
+
+    Raises:
+        ValueError: if it has none.
+    """
+    files = [np.load(path, allow_pickle=False) for path in sorted(folder.glob("*.npz"))]
+    if not files:
+        raise ValueError(f"--folder is {folder}, which has no pictures; accepted: a folder of gate_renders.py")
+    return np.concatenate([f["colours"] for f in files]), np.concatenate([f["masks"] for f in files])
+
+
+def main() -> None:
+    """Draw pictures, and keep them."""
+    args = arguments(__doc__ or "", folder="gate_pictures", pictures=8192, seed=1000, looks="")
+    folder, variety = Path(args.folder), load(args.looks) if args.looks else LEARNED
+    folder.mkdir(parents=True, exist_ok=True)
+    for i in range(-(-args.pictures // TOGETHER)):
+        colours, masks = smaller(pictures(args.seed + i, TOGETHER, variety))
+        np.savez(folder / f"{args.seed + i}.npz", colours=colours, masks=masks)
+        print(f"{(i + 1) * TOGETHER} pictures", flush=True)
+
+
+if __name__ == "__main__":
+    main()

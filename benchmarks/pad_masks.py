@@ -2,7 +2,7 @@
 
     python benchmarks/pad_masks.py [--train 4000] [--pictures 8192] [--more 0] [--unseen 512] [--json FILE]
 
-`--train` learns so many steps and writes `deploy/sight/segment/pad.onnx`; without it the file that ships is measured.
+`--train` learns so many steps and writes `flight/sight/segment/pad.onnx`; without it the file that ships is measured.
 `--more N` begins from the file that is there, with other pictures for each N.
 Outlines, markings, grounds and seeds of the unseen pictures are none of the training's: `pad_renders`.
 """
@@ -11,7 +11,7 @@ import jax
 import numpy as np
 import onnx
 from common import arguments, table, write
-from mask_network import PADS, graph, learned, weights_of
+from mask_network import PADS, Unet, graph, learned, loaded
 from pad_renders import SEEN, SIDE, UNSEEN, Variety, pictures
 
 from e2efly.flight.sight.segment.network import OWN, MaskNetwork
@@ -58,9 +58,10 @@ def main() -> None:
     """Train where it is asked for, measure, print the table, write the figures."""
     args = arguments(__doc__ or "", train=0, pictures=8192, more=0, unseen=512)
     if args.train:
-        before = weights_of(PADS, onnx.load(OWN)) if args.more else None
-        weights = learned(PADS, *drawn(1 + 10 * args.more, args.pictures, SEEN), args.train, weights=before)
-        OWN.write_bytes(graph(PADS, weights).SerializeToString())
+        network = loaded(PADS, onnx.load(OWN)) if args.more else Unet(PADS)
+        colours, masks = drawn(1 + 10 * args.more, args.pictures, SEEN)
+        learned(network, colours, 255 * masks, args.train)
+        OWN.write_bytes(graph(network).SerializeToString())
         print(f"{OWN}: {OWN.stat().st_size} bytes")
     rows = measured("of the training's kinds, other seeds", *drawn(2, args.unseen, SEEN))
     rows += measured("of unseen outlines, markings and grounds", *drawn(3, args.unseen, UNSEEN))

@@ -76,6 +76,7 @@ TITLES = {
     "hil_rehearsal": "Hardware in the loop, rehearsed in real time",
     "hil_room": "Hardware in the loop, rehearsed in a room of 6x6 m",
     "pad_masks": "Masks by the package's network, of rendered pads that it never saw",
+    "gate_masks": "Gates found by a network in rendered colours that it never saw",
     "firmware_faults": "Faults injected into flights of the real firmware",
     "fault_campaign": "Pairs and triples of faults by chance, injected into flights of the real firmware",
     "process_faults": "The bridge's process killed, stopped, its disk full, in flight",
@@ -104,7 +105,7 @@ POLICIES = {
             "many_vehicles", "rate_loop", "mesh_rendering", "rendering", "expert", "thrown_starts", "identify",
             "step_response",
             "identify_structure", "identify_structure_plain", "mavlink", "arducopter", "crazyflie", "step_alignment",
-            "pad_masks",
+            "pad_masks", "gate_masks",
             "identify_betaflight", "runtime_speed", "msp_fuzz",
             "log_fuzz",
         ),
@@ -124,7 +125,7 @@ SCRIPTS = {
     "identify_structure": "identify.py --plant structure --bare --first 1110 --vehicles 20",
     "identify_structure_plain": "identify.py --plant structure --plain --first 1150",
     "hil_rehearsal": "hil_rehearsal.py --vehicle vis_h",
-    "hil_room": "hil_rehearsal.py --room",
+    "hil_room": "hil_rehearsal.py --room", "gate_masks": "gate_masks.py --file gates.onnx",
     "zoo_stress_by_sight": "zoo_stress.py --by-sight", "room_flights": "firmware_flights.py --room",
 }  # fmt: skip
 """What measured a file of results that has not the name of its script."""
@@ -201,6 +202,11 @@ No motion capture: the pose source `gates:` tells the vehicle where it is. Of ea
 degrees askew, images 20 to 60 ms old, a rolling shutter, lost images, gates that stand 2 cm from the map, and an IMU
 with noise and biases. Tracks on MuJoCo; then rows that the estimator was not made for (its own size of four_gates), and
 the stress test; last, whole flights through the real firmware. [How it is done](eyes.md).""",
+    "gate_masks": """
+Whole pictures of 640 x 360 pixels, gates among poles, beams, blocks and walls. Of the looks kept apart, neither
+textures nor sun, bars, panels and seeds are those of the training. A gate can be seen if two corners of its opening
+can, and is found if two of them are, within 10 pixels. The median error counts what is not found as infinite.
+[Racing from colours](eyes.md#from-colours).""",
     "step_response": """
 VIS-R; mean of four steps of each command. The table has the time until 10 % and 63 % of the step, and
 the overshoot. No overshoot is given for thrust, because an accelerometer shakes its measurement.

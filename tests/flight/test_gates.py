@@ -67,6 +67,15 @@ def test_corners_of_openings_are_found_to_half_a_pixel() -> None:
         assert found.inward[k] @ (corners.mean(0) - corner) > 0
 
 
+def test_corners_that_a_network_has_rounded_are_where_the_sides_meet() -> None:
+    corners = np.array([[200.3, 90.8], [330.6, 120.2], [322.1, 262.7], [190.9, 240.4]])
+    soft = cv2.GaussianBlur(drawn(*corners).astype(np.float32), (0, 0), 7.0)
+    found = gate_corners((soft > 0.5 * soft.max()).astype(np.uint8))
+    assert len(found.pixel) == 4
+    away = np.linalg.norm(found.pixel[:, None] - corners[None], axis=-1).min(axis=0)
+    assert away.max() < 1.5
+
+
 def test_a_gate_that_is_half_out_of_the_image_gives_the_corners_that_are_in_it() -> None:
     found = gate_corners(drawn((-80, 100), (90, 100), (90, 250), (-80, 250)))
     assert len(found.pixel) == 2

@@ -27,7 +27,7 @@ from e2efly.policy.odometry import Odometry
 from e2efly.simulation.scenes import camera
 from e2efly.simulation.scenes.camera import Mount
 from e2efly.simulation.scenes.course import frames
-from e2efly.simulation.scenes.gate_looks import KEPT_APART, Look, coloured, drawn, photographed
+from e2efly.simulation.scenes.gate_looks import KEPT_APART, Look, LookFamily, coloured, drawn, photographed
 from e2efly.simulation.scenes.scene import Scene
 from e2efly.validation.plant import RigidState
 from e2efly.validation.plant_flight import imu_of
@@ -60,8 +60,10 @@ class GateCamera:
     lost: float = 0.05
     """Share of the images that are lost."""
     colours: str = ""
-    """The segmenter that finds the gates in colours, such as onnx:FILE. Each flight draws looks of the kinds
-    `KEPT_APART`. Empty: the camera gives the mask of the gates."""
+    """The segmenter that finds the gates in colours, such as onnx:FILE. Empty: the camera gives the mask of the
+    gates."""
+    looks: LookFamily = KEPT_APART
+    """How a world of colours may look; drawn for each flight."""
     imu: ImuConfig = ImuConfig(True, gyro_noise=1.3e-3, accel_noise=2e-2)
     """White noise of the IMU: vibration, too."""
     imu_rate: float = 250.0
@@ -149,7 +151,7 @@ class GateEyes:
         whole = camera.mounted(c, angles, jnp.asarray(1 + c.fov_spread * u[:, 3:4], jnp.float32), offset)
         look = segmenter = None
         if setup.colours:
-            one = drawn(jax.random.key(seed), 1, KEPT_APART)
+            one = drawn(jax.random.key(seed), 1, setup.looks)
             look = jax.tree.map(lambda leaf: jnp.repeat(jnp.asarray(leaf), BANDS, axis=0), one)
             segmenter = chosen(setup.colours)
         return GateEyes(setup, known, scene, banded(whole), float(random.uniform(*c.latency)), random, look, segmenter)

@@ -17,11 +17,13 @@ BORDER = 2.5
 """Vertices this near to the border of the image are where the border cuts a gate, pixels."""
 SHORTEST = 5.0
 """A side shorter than this does not give a line, pixels."""
-COARSE = 1.6
+COARSE = 5.0
 """Largest distance of an outline from the polygon that stands for it, pixels."""
 STRAIGHT = math.radians(30)
 """The sides of a corner differ from a straight line, and from a spike, by at least this angle."""
-CROOKED = 0.7
+BLUNT = 30.0
+"""A side shorter than this between two that are twice as long, and form a corner, is one that was rounded, pixels."""
+CROOKED = 2.0
 """Root mean square of the distances of a side's pixels from its line above which it is not straight, pixels."""
 
 
@@ -61,24 +63,44 @@ def _of_outline(
     if count < 3:
         return []
     at = [int(np.argmin(np.abs(outline - vertex).sum(axis=1))) for vertex in vertices]
+    ends = _sharpened([(at[i], at[(i + 1) % count]) for i in range(count)], outline)
     inside = 1.0 if (_area(vertices) > 0) != around else -1.0  # on which side of the outline the background lies
-    sides = [_line(outline, at[i], at[(i + 1) % count], inside) for i in range(count)]
+    sides = [_line(outline, begin, end, inside) for begin, end in ends]
     limit = np.array(shape[1::-1]) - 1 - BORDER
     corners = []
-    for i, vertex in enumerate(vertices):
+    for i, (begin, _) in enumerate(ends):
         before, after = sides[i - 1], sides[i]
-        if before is None or after is None or np.any(vertex < BORDER) or np.any(vertex > limit):
+        vertex, other = outline[begin], outline[ends[i - 1][1]]  # two, where a blunt corner was
+        near, far = np.minimum(vertex, other), np.maximum(vertex, other)
+        if before is None or after is None or np.any(near < BORDER) or np.any(far > limit):
             continue
         (a, u), (b, v) = before, after
         turn = u[0] * v[1] - u[1] * v[0]
         if turn * inside < math.sin(STRAIGHT):  # straight on, a spike, or a corner of the background outside of a gate
             continue
         point = a + u * ((b - a)[0] * v[1] - (b - a)[1] * v[0]) / turn
-        if np.abs(point - vertex).max() > 2 * COARSE:
+        if np.any(point < near - 2 * COARSE) or np.any(point > far + 2 * COARSE):
             continue
         inward = v - u
         corners.append((point + 0.5, inward / np.linalg.norm(inward)))
     return corners
+
+
+def _sharpened(sides: list[tuple[int, int]], outline: np.ndarray) -> list[tuple[int, int]]:
+    """Sides from one pixel of the outline to another, without those that only cut a corner off: a network rounds the
+    corners of its masks.
+    """
+    while len(sides) > 3:
+        way = np.array([outline[end] - outline[begin] for begin, end in sides])
+        length = np.linalg.norm(way, axis=1)
+        before, after = np.roll(way, 1, axis=0), np.roll(way, -1, axis=0)
+        around = np.roll(length, 1), np.roll(length, -1)
+        corner = np.abs((before * after).sum(axis=1)) < math.cos(STRAIGHT) * around[0] * around[1]
+        cut = corner & (length < BLUNT) & (2 * length < np.minimum(*around))
+        if not cut.any():
+            break
+        sides.pop(int(np.argmin(np.where(cut, length, np.inf))))
+    return sides
 
 
 def _line(outline: np.ndarray, begin: int, end: int, inside: float) -> tuple[np.ndarray, np.ndarray] | None:

@@ -20,10 +20,12 @@ from e2efly.simulation.scenes.camera import Mount, pattern, pose
 from e2efly.simulation.scenes.cast import Light, cast
 from e2efly.simulation.scenes.scene import COLOURS, GATE, GROUND, OBSTACLE, SKY, Scene
 from e2efly.simulation.scenes.shapes import FAR
-from e2efly.simulation.scenes.textures import hashed, smooth, texture
+from e2efly.simulation.scenes.textures import hashed, smooth, texture, worn
 
 PAINTS = 12
 """Colours from which those of a gate are chosen."""
+CLASSES = (SKY, GROUND, OBSTACLE, GATE)
+"""Rows of a look."""
 CHANNELS = ("depth", "label", "instance", "normal", "rgb")
 
 
@@ -43,12 +45,20 @@ class LookFamily:
     """How much more red than blue, or less."""
     blur: tuple[float, float]
     """Standard deviation of the lens's blur, pixels at 640 columns."""
+    paint: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    """RGB of the two colours of a gate's texture. None: in each world those that are unlike what is around."""
 
 
-SEEN = LookFamily((0, 1, 3, 6, 7), (0, 1, 2, 3, 7), (0.5, 1.5), (0.0, 0.6), (0.5, 1.3), (0.0, 0.12), (0.4, 1.3))
-"""Gates of noise, tiles, checker, plain, stripes; around them noise, tiles, planks, checker, stripes."""
+_OTHERS = (10, 11, 12, 13, 14, 15, 16)
+"""Cells, marble, waves, blocks, ramps, crosses, camouflage."""
+SEEN = LookFamily(
+    (0, 1, 3, 6, 7, *_OTHERS), (0, 1, 2, 3, 7, *_OTHERS), (0.5, 1.5), (0.0, 0.6), (0.5, 1.3), (0.0, 0.12), (0.4, 1.3)
+)
+"""Gates of noise, tiles, checker, plain, stripes; around them noise, tiles, planks, checker, stripes; and others."""
+TRIED = dataclasses.replace(SEEN, gate=(17, 18, 19), around=(17, 18, 19))
+"""Triangles, rings, weave: to see, while a network is made, what it finds in looks that it has not learned."""
 KEPT_APART = LookFamily((2, 5, 8, 9), (4, 5, 8, 9), (0.2, 0.5), (0.6, 0.75), (0.6, 1.1), (0.12, 0.18), (0.5, 1.5))
-"""Gates of planks, gravel, spots, diagonal bands; around them plates, gravel, spots, diagonal bands."""
+"""Gates of planks, gravel, spots, diagonal bands; around them plates, gravel, spots, diagonal bands. For judging."""
 
 
 @jax.tree_util.register_dataclass
@@ -85,11 +95,13 @@ def drawn(key: PRNGKeyArray, n: int, family: LookFamily) -> Look:
     )
     grey, colourful = uniform(4, 3, 1, of=(0.05, 1.0)), uniform(4, 3, 1) ** 2
     colour = jnp.clip(grey + colourful * uniform(4, 3, 3, of=(-0.7, 0.7)), 0, 1)
-    # a gate is painted to be seen: of some colours, those farthest from what is around it
     paint = uniform(PAINTS, 3)
-    away = jnp.abs(paint[:, :, None] - colour[:, :3, :2].reshape(n, 1, 6, 3)).max(-1).min(-1)
-    best = jnp.argsort(-away, axis=1)[:, :3]
-    colour = colour.at[:, 3].set(jnp.take_along_axis(paint, best[..., None], axis=1))
+    if family.paint is not None:
+        colour = colour.at[:, 3, :2].set(jnp.asarray(family.paint))
+    else:  # it is painted to be seen: of some colours, those farthest from what is around it
+        away = jnp.abs(paint[:, :, None] - colour[:, :3, :2].reshape(n, 1, 6, 3)).max(-1).min(-1)
+        best = jnp.argsort(-away, axis=1)[:, :3]
+        colour = colour.at[:, 3].set(jnp.take_along_axis(paint, best[..., None], axis=1))
     turn, height = uniform(of=(0.0, 2 * jnp.pi)), uniform(of=family.sun)
     sun = jnp.stack([jnp.cos(turn) * jnp.cos(height), jnp.sin(turn) * jnp.cos(height), jnp.sin(height)], axis=-1)
     tint = uniform(of=family.tint) * jnp.sign(uniform() - 0.5)
@@ -111,33 +123,33 @@ def coloured(
     origin, matrix = pose(mount, position, quaternion)
     white = {kind: dataclasses.replace(s, colour=jnp.ones_like(s.colour)) for kind, s in scene.solids.items()}
     seen = cast(dataclasses.replace(scene, solids=white), origin, matrix, rays, CHANNELS, look.light)
-    way = jnp.asarray(rays.directions)
+    way = jnp.moveaxis(jnp.asarray(rays.directions), -1, 0)
 
     def world(given: tuple[dict[str, Array], Array, Array, Look]) -> Array:
         found, origin, matrix, look = given
-        label, depth, normal = found["label"], found["depth"], found["normal"]
-        direction = jnp.einsum("ij,hwj->hwi", matrix, way)
-        point = origin + depth[..., None] * direction
-        heading = jnp.arctan2(direction[..., 1], direction[..., 0])
-        rise = direction[..., 2] / jnp.sqrt((direction[..., :2] ** 2).sum(-1) + 1e-9)
-        level = jnp.abs(normal[..., 2]) > 0.7
-        along = point[..., 1] * normal[..., 0] - point[..., 0] * normal[..., 1]
+        label, normal = found["label"], jnp.moveaxis(found["normal"], -1, 0)
+        ahead = [sum(matrix[i, j] * way[j] for j in range(3)) for i in range(3)]  # a product of matrices takes longer
+        point = [o + found["depth"] * direction for o, direction in zip(origin, ahead, strict=True)]
+        level = jnp.abs(normal[2]) > 0.7
+        along = point[1] * normal[0] - point[0] * normal[1]
         sky = label == SKY
-        x = jnp.where(sky, 3 * heading, jnp.where(level, point[..., 0], along))
-        y = jnp.where(sky, 3 * rise, jnp.where(level, point[..., 1], point[..., 2]))
-        colour = jnp.zeros((*label.shape, 3))
-        for row, which in enumerate((SKY, GROUND, OBSTACLE, GATE)):
-            own, second, third = look.colour[row]
-            share = texture(look.texture[row], x, y, look.number[row])[..., None]
-            mixed = own * (1 - share) + second * share
-            if which != GATE:
-                blotch = smooth(1.3 * x, 1.7 * y, look.number[row, 1])[..., None] > 0.7
-                mixed = jnp.where(blotch, 0.4 * mixed + 0.6 * third, mixed)
-            if which == OBSTACLE:  # each another one
-                instance = found["instance"]
-                tone = jnp.stack([hashed(instance, instance + k, look.number[2, 2]) for k in range(3)], axis=-1)
-                mixed = 0.5 * mixed + 0.5 * tone
-            colour = jnp.where((label == which)[..., None], mixed, colour)
+        x = jnp.where(sky, 3 * jnp.arctan2(ahead[1], ahead[0]), jnp.where(level, point[0], along))
+        y = jnp.where(sky, 3 * ahead[2] / jnp.hypot(ahead[0], ahead[1]), jnp.where(level, point[1], point[2]))
+        row = jnp.select([label == which for which in CLASSES], list(range(len(CLASSES))))
+        share = jnp.zeros(label.shape)
+        for k, which in enumerate(CLASSES):
+            here = label == which
+            kind = partial(texture, look.texture[k], x, y, look.number[k])
+            share = jnp.where(here, jax.lax.cond(here.any(), kind, lambda: 0 * x), share)
+        number = look.number[row]
+        own, second, third = jnp.moveaxis(look.colour[row], 2, 0)
+        share = worn(share, x, y, number)[..., None]
+        colour = own * (1 - share) + second * share
+        blotch = (smooth(1.3 * x, 1.7 * y, number[..., 1]) > 0.7) & (label != GATE)
+        colour = jnp.where(blotch[..., None], 0.4 * colour + 0.6 * third, colour)
+        instance = found["instance"]  # obstacles: each another one
+        tone = jnp.stack([hashed(instance, instance + k, look.number[2, 2]) for k in range(3)], axis=-1)
+        colour = jnp.where((label == OBSTACLE)[..., None], 0.5 * colour + 0.5 * tone, colour)
         # of `cast`'s colours, only the brightness
         red = jnp.where(label == SKY, COLOURS[SKY, 0], jnp.where(label == GROUND, COLOURS[GROUND, 0], 1.0))
         bright = found["rgb"][..., 0] / red
@@ -172,5 +184,5 @@ def photographed(
         along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
         kernel = np.clip(1 - np.abs(across), 0, 1) * np.clip(length / 2 + 0.5 - np.abs(along), 0, 1)
         image = cv2.filter2D(image, -1, (kernel / kernel.sum()).astype(np.float32), borderType=cv2.BORDER_REPLICATE)
-    white, relative = random.standard_normal((2, *image.shape), dtype=np.float32)
-    return np.clip(np.round(255 * (image + noise[0] * white + noise[1] * image * relative)), 0, 255).astype(np.uint8)
+    image += np.hypot(noise[0], noise[1] * image) * random.standard_normal(image.shape, dtype=np.float32)
+    return np.clip(np.round(255 * image), 0, 255).astype(np.uint8)
