@@ -295,7 +295,8 @@ class Env:
 
     def showing(self, names: Sequence[str]) -> "Env":
         """The same environment, with an observation of only those fields that have these names."""
-        task, every = self.task, dataclasses.replace(self, unseen=())
+        task: Any = self.task
+        every = dataclasses.replace(self, unseen=())
         if isinstance(task, Goal) and isinstance(task.config, TaskConfig):
             config = dataclasses.replace(task.config.showing(names), observes=None)
             task = dataclasses.replace(task, config=config)

@@ -85,4 +85,5 @@ class DAgger(Algorithm):
 
 def teacher(env: Env, config: DAggerConfig) -> Teacher | Expert:
     """The teacher that the options name: by default, the zoo's policy of the same task."""
-    return teacher_of(config.teacher or env.task.config.name)
+    task: Any = env.task
+    return teacher_of(config.teacher or task.config.name)

@@ -88,7 +88,7 @@ def network_of(path: Path, loaded: Policy) -> NetworkConfig:
     widths = {x.name: x.dims[-1] for x in graph.initializer}
     layers = [int(widths[name]) for i in range(len(widths)) if (name := f"weight_{i}") in widths]
     made = next((node.op_type for node in graph.node if "hidden_1" in node.output), None)
-    activation = next((name for name, operator in OPERATORS.items() if operator == made), None)
+    activation: Any = next((name for name, operator in OPERATORS.items() if operator == made), None)
     if len(layers) < 2 or activation is None:
         raise ValueError(f"{path}: it has no hidden layers of e2efly; accepted: a policy that e2efly has trained")
     return NetworkConfig(tuple(layers[:-1]), activation, recurrent=loaded.contract.memory_size)
