@@ -297,7 +297,7 @@ class Env:
         """The same environment, with an observation of only those fields that have these names."""
         task: Any = self.task
         every = dataclasses.replace(self, unseen=())
-        if isinstance(task, Goal) and isinstance(task.config, TaskConfig):
+        if isinstance(self.task, Goal) and isinstance(self.task.config, TaskConfig):
             config = dataclasses.replace(task.config.showing(names), observes=None)
             task = dataclasses.replace(task, config=config)
             if any(field.name not in names for field in task.fields):
