@@ -1,13 +1,16 @@
 """Racing by eye end to end: a run of `race_eyes` on each of its tracks, in the simulator and through the real firmware.
 
-    python benchmarks/race_eyes.py --run DIR [--episodes 1000] [--flights 20] [--whole 5] [--seed 9000000]
+    python benchmarks/race_eyes.py [--run DIR] [--episodes 1000] [--flights 20] [--whole 5] [--seed 9000000]
 
-The run is one of `e2efly train race_eyes --seed 0`; its seed draws none of these starts. `--flights` starts of each
+Without a run, `e2efly train race_eyes --seed 0` makes one, which draws none of these starts. `--flights` starts of each
 track fly on MuJoCo and on the plant of the real Betaflight firmware. `--whole` flights take off, fly three laps of
 four_gates or of circle_3d, and land, through the firmware, told their place by motion capture but for the policy. Rows
 of the stress have a quarter of the starts.
 """
 
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +40,20 @@ LAPPED = ("four_gates", "circle_3d")
 
 
 def main() -> None:
-    """Fly, print the tables, write the figures."""
+    """Train, if there is no run, and measure."""
     args = arguments(__doc__ or "", run="", episodes=1000, flights=20, whole=5, seed=9_000_000)
     compute_at_once()
     prepare("cpu")
-    run = Path(args.run)
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(args.run or Path(folder) / "run")
+        if not args.run:
+            command = ["train", "race_eyes", "--seed", "0", "--no-plots", "--out", str(run)]
+            subprocess.run([sys.executable, "-m", "e2efly", *command], check=True)
+        measure(run, args)
+
+
+def measure(run: Path, args: Any) -> None:
+    """Fly a run, print the tables, write the figures."""
     flown = {
         name: {row: {track: summary(e) for track, e in of.items()} for row, of in stressed(run, name, args).items()}
         for name in ("nominal", "rows")
