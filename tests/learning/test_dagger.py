@@ -15,7 +15,9 @@ from e2efly.learning.devices import OWN, on_each, own, stacked
 from e2efly.learning.setup import Setup
 from e2efly.learning.teacher import teacher_of
 from e2efly.policy.loader import load_policy
-from e2efly.runs.presets import preset
+from e2efly.policy.zoo import policy_file
+from e2efly.runs.inputs import input_files
+from e2efly.runs.presets import begun, for_vehicle, preset
 from e2efly.simulation.physics import State
 
 
@@ -90,3 +92,12 @@ def test_by_default_the_teacher_is_the_zoos_policy_of_the_task() -> None:
     assert setup("hover", env={"past_actions": 4}).parameters()
     with pytest.raises(ValueError, match=r"observes 4 past actions; accepted: at most 3, .* or env.past_actions 4"):
         setup("hover").parameters()
+
+
+def test_a_run_keeps_the_file_of_its_teacher_that_of_its_vehicle() -> None:
+    config = preset("race_eyes", "dagger", "nominal")
+    assert input_files(begun(config))["algo.teacher"] == policy_file("race_any").absolute()
+    other = for_vehicle(preset("race", "dagger", "nominal"), "crazyflie")
+    assert input_files(begun(other))["algo.teacher"] == policy_file("race", "crazyflie").absolute()
+    taught = dataclasses.replace(config, algo=DAggerConfig(teacher="expert"))
+    assert begun(taught) == taught and "algo.teacher" not in input_files(taught)

@@ -274,6 +274,10 @@ class FOPPOConfig(_Proximal, _FirstOrder):
     """Discount per step."""
 
 
+EXPERT = "expert"
+"""The name of a task's expert as a teacher."""
+
+
 @register("dagger")
 @dataclass(frozen=True)
 class DAggerConfig(_Annealed):

@@ -66,8 +66,6 @@ from e2efly.vehicles.loading import load_vehicle
 from e2efly.vehicles.posterior import IDENTIFIED, Posterior
 from e2efly.vehicles.vehicle import Flown
 
-INERTIAL_FIELDS = tuple(row.field.name for row in OWN if row.source == "imu")
-"""Names of the fields of an IMU. A task that names one to be observed has an IMU."""
 DEFAULT = EnvConfig()
 """The VIS-R; only the starts are random."""
 
@@ -188,7 +186,8 @@ class Env:
         shape = Shape(body.feet_height, body.radius)
         oldest = max(config.observation_latency[1], *(camera.latency[1] for camera in config.cameras), 0.0)
         flown_task = _flown_task(task, shape, physics)
-        felt = config.imu.observed or any(field in (task.observes or ()) for field in INERTIAL_FIELDS)
+        named = task.observes or ()
+        felt = config.imu.observed or any(row.source == "imu" and row.field.name in named for row in OWN)
         mine = own_fields(imu=felt, actions=seen, size=len(low))
         unseen = hidden(task, flown_task, [row.field for row in mine])
         if getattr(flown_task, "agents", 1) == 1:
@@ -295,15 +294,12 @@ class Env:
 
     def showing(self, names: Sequence[str]) -> "Env":
         """The same environment, with an observation of only those fields that have these names."""
-        task: Any = self.task
-        every = dataclasses.replace(self, unseen=())
-        if isinstance(self.task, Goal) and isinstance(self.task.config, TaskConfig):
-            config = dataclasses.replace(task.config.showing(names), observes=None)
-            task = dataclasses.replace(task, config=config)
-            if any(field.name not in names for field in task.fields):
-                task = dataclasses.replace(task, config=dataclasses.replace(config, observes=tuple(names)))
-        unseen = tuple(row.field.name for row in every._own if row.field.name not in names)
-        return dataclasses.replace(self, task=task, unseen=unseen)
+        own_options = isinstance(self.task, Goal) and isinstance(self.task.config, TaskConfig)
+        task = self.task.shown_to(names) if isinstance(self.task, Goal) and own_options else self.task
+        every = dataclasses.replace(self, unseen=())._own
+        return dataclasses.replace(
+            self, task=task, unseen=tuple(row.field.name for row in every if row.field.name not in names)
+        )
 
     @property
     def observation_size(self) -> int:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from e2efly.config.algorithms import EXPERT
 from e2efly.environment import Env, EnvState
 from e2efly.learning.networks import Actor, Weights
 from e2efly.learning.warm_start import network_of, weights_of
@@ -16,9 +17,6 @@ from e2efly.policy.contract import Contract
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.tasks.task import Guided
-
-EXPERT = "expert"
-"""The name of the task's expert as a teacher."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +35,14 @@ class Teacher:
         self, env: Env, state: EnvState, memory: Float[Array, "n m"]
     ) -> tuple[Float[Array, "n c"], Float[Array, "n m"]]:
         """Its actions and its next memories. It is shown the true motion, without age and errors."""
-        told = env.showing([field.name for field in self.contract.observation])
-        told = dataclasses.replace(told, seen_actions=self.contract.past_actions)
+        told = self._told(env)
         features = self.actor.features(told.shown(state, state.vehicle))
         action, memory = self.actor(self.weights, features, memory)
         return jax.lax.stop_gradient((action, memory))
+
+    def _told(self, env: Env) -> Env:
+        told = env.showing([field.name for field in self.contract.observation])
+        return dataclasses.replace(told, seen_actions=self.contract.past_actions)
 
     def check(self, env: Env) -> None:
         """Refuse an environment in which it cannot fly.
@@ -49,9 +50,7 @@ class Teacher:
         Raises:
             ValueError: naming what the teacher sees or commands, and what the environment has.
         """
-        names = [field.name for field in self.contract.observation]
-        told = dataclasses.replace(env.showing(names), seen_actions=self.contract.past_actions)
-        known = {field.name: (field.size, field.frame, field.scale) for field in told.fields}
+        known = {field.name: (field.size, field.frame, field.scale) for field in self._told(env).fields}
         for field in self.contract.observation:
             if known.get(field.name) != (field.size, field.frame, field.scale):
                 raise ValueError(

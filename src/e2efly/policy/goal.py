@@ -112,6 +112,11 @@ class Goal:
         del names
         return cls
 
+    def shown_to(self, names: Sequence[str]) -> Any:
+        """The same goal, which shows a policy only its fields of these names, whatever its options say."""
+        options = dataclasses.replace(self.config.showing(names), observes=tuple(names))
+        return dataclasses.replace(self, config=options)  # type: ignore[type-var]
+
     @property
     def shown(self) -> tuple[Observed, ...]:
         """The task's own observation fields that its options show."""

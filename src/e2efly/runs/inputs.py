@@ -1,5 +1,5 @@
 """A configuration as a run keeps it: as JSON, with copies of the files that it names (vehicle, track, reference, table
-of a noise, first policy), and compared by their content.
+of a noise, first policy, teacher), and compared by their content.
 """
 
 import dataclasses
@@ -34,8 +34,9 @@ def input_files(config: TrainConfig) -> dict[str, Path]:
     track = getattr(config.task, "track", ())
     tracks = {"task.track": track} if isinstance(track, str) else {f"task.track.{i}": x for i, x in enumerate(track)}
     found |= {field: track_file(name) for field, name in tracks.items() if name != ANY}
-    if config.start_from is not None:
-        found["start_from"] = Path(config.start_from)
+    for field in ("start_from", "algo.teacher"):
+        if (name := value_at(config, field)) and name.endswith(".onnx"):
+            found[field] = Path(name)
     named = {"task.reference": getattr(config.task, "reference", "")}
     named |= {f"env.cameras.{i}.noise.redwood": c.noise.redwood or "" for i, c in enumerate(config.env.cameras)}
     return found | {field: Path(name) for field, name in named.items() if name.endswith(OWN_FILES)}

@@ -19,6 +19,7 @@ from e2efly.config import (
     TaskConfig,
     TrainConfig,
 )
+from e2efly.config.algorithms import EXPERT
 from e2efly.config.names import unknown
 from e2efly.config.numbers import check_fields
 from e2efly.config.registry import is_shipped
@@ -272,7 +273,8 @@ def _narrower(env: EnvConfig, share: float) -> EnvConfig:
 
 
 def begun(config: TrainConfig) -> TrainConfig:
-    """A configuration with the file of its initial policy, and with the observations and commands of that policy.
+    """A configuration with the files of its teacher and its initial policy, and with the latter's observations and
+    commands.
 
     It has the same number of past actions as that policy, unless the configuration gives another number. The actions of
     a policy of many vehicles keep their meaning as commands. Those of another policy are shares of the vehicle's own
@@ -281,6 +283,11 @@ def begun(config: TrainConfig) -> TrainConfig:
     Raises:
         ValueError: for a policy that does not exist, or cannot be read.
     """
+    teacher = getattr(config.algo, "teacher", EXPERT)
+    if teacher != EXPERT:
+        file = policy_file(teacher or config.task.name, config.env.vehicle)
+        algo: Any = dataclasses.replace(config.algo, teacher=str(file.absolute()))
+        config = dataclasses.replace(config, algo=algo)
     if config.start_from is None:
         return config
     file = policy_file(config.start_from, config.env.vehicle)

@@ -76,14 +76,11 @@ class Route:
     def course_of(self, contract: Contract, shape: Shape) -> Course:
         """The course for a policy. If a task has several kinds of observation, the course uses that of this policy."""
         course = self.course(shape, 1 / contract.control_rate_hz)
-        names, memory = [field.name for field in contract.observation], course.memory
-        options = dataclasses.replace(course.goal.config.showing(names), observes=None)
-        if any(field.name not in names for field in dataclasses.replace(course.goal, config=options).fields):
-            options = dataclasses.replace(options, observes=tuple(names))
+        goal, memory = course.goal.shown_to([field.name for field in contract.observation]), course.memory
         if course.goal.neighbours:
-            options = dataclasses.replace(options, neighbours=contract.neighbours)
+            goal = dataclasses.replace(goal, config=dataclasses.replace(goal.config, neighbours=contract.neighbours))
             memory = course.goal.among(memory, nobody(np.atleast_2d(course.start), contract.neighbours))
-        return dataclasses.replace(course, goal=dataclasses.replace(course.goal, config=options), memory=memory)
+        return dataclasses.replace(course, goal=goal, memory=memory)
 
     @classmethod
     def drawn(cls, course: Course, file: Path) -> "Route":
@@ -153,8 +150,8 @@ def fields_of(contract: Contract) -> tuple[Field, ...]:
         return usual_route(contract).course_of(contract, shape).goal.fields
     if not goal.observation:
         return goal.fields  # type: ignore[return-value]
-    options = dataclasses.replace(TASKS.find(contract.task)().showing(names), observes=None)
-    return tuple(field for field, _ in goal.observation if options.shows(field.name) and field.name in names)
+    options = dataclasses.replace(TASKS.find(contract.task)().showing(names), observes=tuple(names))
+    return tuple(field for field, _ in goal.observation if options.shows(field.name))
 
 
 def course_for(contract: Contract, vehicle: Vehicle, route: Route | None = None) -> Course:

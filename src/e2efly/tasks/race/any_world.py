@@ -105,19 +105,21 @@ def drawn(key: PRNGKeyArray, n: int, style: TrackStyle, room: int = 0) -> Tracks
     return random_tracks(jax.random.uniform(key, (n, math.prod(numbers))).reshape(n, *numbers), style)
 
 
-def several(names: tuple[str, ...], scale: float = 1.0, chance: TrackStyle | None = None) -> Tracks:
+def several(names: tuple[str, ...], scale: float = 1.0, chance: TrackStyle | None = None, only: float = -1.0) -> Tracks:
     """Tracks with enlarged ground plans, one in each world, in arrays for as many gates as the longest has.
 
     If a style is given, one name is `any`: in its place stands one track of that style, to be drawn anew.
 
     Raises:
-        ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, and for a
-            name given twice.
+        ValueError: for an unknown or broken track, for no track at all, for one name in place of a tuple, for a name
+            given twice, and for a chosen track, `only`, that is not among them.
     """
     if isinstance(names, str) or not names:
         raise ValueError(f"task.track is {names!r}; accepted: a tuple of one or more tracks")
     if len({Path(name).stem for name in names}) < len(names):
         raise ValueError(f"task.track is {names}; accepted: tracks of different names, which tell the criteria")
+    if only not in range(-1, len(names)):
+        raise ValueError(f"task.only is {only}; accepted: whole numbers from -1 to {len(names) - 1}")
     tracks, room = {name: load_track(name).enlarged(scale) for name in names if chance is None or name != ANY}, 0
     if chance is not None:
         tracks[ANY], room = random_tracks(np.zeros((1, *chance.numbers()), np.float32), chance).track(0), chance.most

@@ -4,7 +4,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 from e2efly.config import (
@@ -32,6 +31,7 @@ from e2efly.config.numbers import ANGLE, SPEED
 from e2efly.config.run import CRL_RACING
 from e2efly.courses.random_tracks import ANY, CLUTTERED
 from e2efly.courses.tracks import load_track
+from e2efly.tasks.race.tracks_used import by_track, used
 from e2efly.tasks.registry import register
 
 THREE = ("s_shaped", "circle_3d", "j_shaped")
@@ -120,16 +120,13 @@ class RaceClutterConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Each track that is used, with one lap or the requested number of laps. Collisions end the episode."""
         judged = dataclasses.replace(self, laps=max(self.laps, 1), collisions_end=True)
-        if len(self.track) == 1:
-            return {self.name: judged}
-        used = range(len(self.track)) if self.only < 0 else [int(self.only)]
-        return {Path(self.track[i]).stem: dataclasses.replace(judged, only=float(i)) for i in used}
+        return by_track(judged)
 
     def domain(self) -> Domain:
         """The tracks with their displaced gates, the commanded speed, and up to so many obstacles."""
-        names = self.track if self.only < 0 else (self.track[int(self.only)],)
         tracks = union(
-            CLUTTERED.domain if name == ANY else track_domain(load_track(name).enlarged(self.scale)) for name in names
+            CLUTTERED.domain if name == ANY else track_domain(load_track(name).enlarged(self.scale))
+            for name in used(self)
         )
         return (
             *displaced(tracks, self.gate_position, self.gate_yaw),

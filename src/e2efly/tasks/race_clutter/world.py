@@ -58,14 +58,11 @@ class RaceClutter(RaceClutterGoal):
         """Load the tracks.
 
         Raises:
-            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
-                is not among them.
+            ValueError: for an unknown or broken track, and for tracks that `several` refuses.
         """
         chance = (config.track.index(ANY), CLUTTERED) if ANY in config.track else None
-        given = several(config.track, config.scale, chance and chance[1])
+        given = several(config.track, config.scale, chance and chance[1], config.only)
         count = len(config.track)
-        if config.only not in range(-1, count):
-            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {count - 1}")
         # the tracks are resolved here, so that they share a compiled program
         numbers = dataclasses.replace(config, track=("",) * count)
         return RaceClutter(numbers, shape, control_period, checks, given, chance)

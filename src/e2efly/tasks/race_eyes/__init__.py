@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 from e2efly.config import (
@@ -27,17 +26,18 @@ from e2efly.config.domain import Domain, displaced, track_domain, union
 from e2efly.config.numbers import ANGLE
 from e2efly.courses import defaults
 from e2efly.courses.tracks import load_track
+from e2efly.tasks.race.tracks_used import by_track, used
 from e2efly.tasks.registry import register
 
 SENSED = ("attitude", "gyroscope", "accelerometer", "past_actions")
 """What a vehicle knows without a pose. Of the attitude, the network takes where up is."""
-RACER = dataclasses.replace(
+EYE = dataclasses.replace(
     AHEAD, sees="mask", of="gate", width=64, height=36, noise=ImageNoiseConfig(), rate=30.0, latency=(0.02, 0.06),
     angle_spread=math.radians(2),
 )  # fmt: skip
 """The camera, which sees gates: tilted up, mounted a little askew, and late."""
 ABOUT = EnvConfig(
-    cameras=(RACER,),
+    cameras=(EYE,),
     latency_spread=(0.01, 0.02),
     randomize={
         "mass": 0.1, "inertia": 0.2, "motor_time_constant": 0.4, "rate_gain": 0.4, "drag_linear": 0.5,
@@ -47,7 +47,8 @@ ABOUT = EnvConfig(
     disturbance=DisturbanceConfig(gust=0.5, thrust=0.1, rotor=0.05, sag=0.1),
     link=LinkConfig(dropped=0.05),
 )  # fmt: skip
-"""Vehicles about that of the file, of which the teacher, made for the file alone, flies nearly all."""
+"""Vehicles and air about those of the file. The teacher, which is made for the file alone, flies random tracks with
+them in 86 % of the episodes, and with its own in 96 %."""
 
 
 @register("race_eyes")
@@ -60,7 +61,7 @@ class RaceEyesConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.race_eyes.goal:RaceEyesRoute"
     best: ClassVar = "dagger"
     precision: ClassVar = "duration"
-    cameras: ClassVar = (RACER,)
+    cameras: ClassVar = (EYE,)
 
     episode_s: float = 20.0
     """Length of an episode, s."""
@@ -95,15 +96,11 @@ class RaceEyesConfig(TaskConfig):
     def criteria(self) -> dict[str, TaskConfig]:
         """Each track that is used, with one lap or the requested number of laps."""
         judged = dataclasses.replace(self, laps=max(self.laps, 1))
-        if len(self.track) == 1:
-            return {self.name: judged}
-        used = range(len(self.track)) if self.only < 0 else [int(self.only)]
-        return {Path(self.track[i]).stem: dataclasses.replace(judged, only=float(i)) for i in used}
+        return by_track(judged)
 
     def domain(self) -> Domain:
         """The tracks with their displaced gates."""
-        names = self.track if self.only < 0 else (self.track[int(self.only)],)
-        tracks = union(track_domain(load_track(name).enlarged(self.scale)) for name in names)
+        tracks = union(track_domain(load_track(name).enlarged(self.scale)) for name in used(self))
         return displaced(tracks, self.gate_position, self.gate_yaw)
 
     @property

@@ -31,14 +31,11 @@ class RaceEyes(AnyRace):
         """Load the tracks.
 
         Raises:
-            ValueError: for an unknown or broken track, for tracks that `several` refuses, and for a chosen track that
-                is not among them.
+            ValueError: for an unknown or broken track, and for tracks that `several` refuses.
         """
-        given = several(config.track, config.scale)
+        given = several(config.track, config.scale, only=config.only)
         if config.laps > 1 and not given.closed.all():
             raise ValueError(f"laps is {config.laps}; accepted: 0 or 1, as not all of the tracks are closed")
-        if config.only not in range(-1, len(config.track)):
-            raise ValueError(f"task.only is {config.only}; accepted: whole numbers from -1 to {len(config.track) - 1}")
         # the tracks are resolved here, so that they share a compiled program
         return RaceEyes(dataclasses.replace(config, track=("",) * len(config.track)), shape, given)
 
