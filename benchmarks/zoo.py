@@ -43,6 +43,7 @@ import numpy as np
 import onnx
 from common import arguments, table
 
+from e2efly.config.algorithms import EXPERT
 from e2efly.config.storage import write_json
 from e2efly.environment.limits import posterior_of, sensing_of, vehicles_of
 from e2efly.environment.stress_rows import ALL, rows_for
@@ -61,11 +62,14 @@ from e2efly.validation.stress import every_row
 from e2efly.vehicles.family import family_names
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 
-VARIANTS = {"race_any": ("race", "any_track"), "hover_rotors": ("hover", "rotors")}
-"""Policies of a task by a preset of its own: task and preset."""
+VARIANTS = {
+    "race_any": ("race", "any_track", "bptt"), "hover_rotors": ("hover", "rotors", "bptt"),
+    "race_told": ("race_eyes", "told", "bptt"),
+}  # fmt: skip
+"""Policies of a task by a preset of its own: task, preset and algorithm."""
 ALONE = {
     "race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_payload": USUAL,
-    "race_duel": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
+    "race_duel": USUAL, "race_told": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
 }  # fmt: skip
 """For this vehicle alone."""
 FRAMES = "multirotor"
@@ -88,7 +92,7 @@ def run(*command: str) -> None:
 
 def algorithms(task: str) -> tuple[str, ...]:
     """What is tried, in this order."""
-    return (TASKS[VARIANTS.get(task, (task, ""))[0]].best,)
+    return (VARIANTS[task][2] if task in VARIANTS else TASKS[task].best,)
 
 
 def stressed(policy: Path, folder: Path, *options: str) -> dict[str, dict[str, float]]:
@@ -116,7 +120,7 @@ def measured(task: str, known: Collection[str] = ()) -> tuple[str, ...]:
 
 def recipe(vehicle: str, task: str) -> tuple[str, str]:
     """The task that a policy is of, and the preset by which it is learned; empty: the one that `train` takes."""
-    kind, own = VARIANTS.get(task, (task, ""))
+    kind, own, _ = VARIANTS.get(task, (task, "", ""))
     alone = presets.ROBUST if TASKS[kind].best in TASKS[kind].robust else presets.NOMINAL
     return kind, own or ("" if vehicle in family_names() else alone)
 
@@ -167,15 +171,10 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     if (seen := samples_file(policy)).is_file():
         shutil.copy(seen, samples_file(kept))
     config = RunDirectory(policy.parent).config()
-    if config.start_from is not None:  # a policy of the zoo: by its name, wherever the zoo is
-        digest = hashlib.sha256(Path(config.start_from).read_bytes()).hexdigest()
-        named = (
-            f"{whose}/{name}" for whose, has in contents().items() for name in has if has[name]["sha256"] == digest
-        )
-        start = next(named, None)
-        if start is None:
-            raise SystemExit(f"{policy} started from {config.start_from}; accepted: a policy of the zoo, as it is now")
-        config = dataclasses.replace(config, start_from=start)
+    if config.start_from is not None:
+        config = dataclasses.replace(config, start_from=of_the_zoo(config.start_from))
+    if (teacher := getattr(config.algo, "teacher", EXPERT)) != EXPERT:
+        config = dataclasses.replace(config, algo=dataclasses.replace(config.algo, teacher=of_the_zoo(teacher)))
     write_json(config_file(kept), to_json(config), indent=None)
     curve_file(kept).write_text(curve(RunDirectory(policy.parent)), encoding="utf-8")
     zoo = contents() if (FOLDER / "zoo.json").exists() else {}
@@ -185,6 +184,16 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     line = {"vehicle": vehicle, "task": task, "success, %": success, "kB": kept.stat().st_size // 1000}
     print(line, flush=True)
     return line
+
+
+def of_the_zoo(file: str) -> str:
+    """The name of a policy of the zoo, wherever the zoo is."""
+    digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    for whose, has in contents().items():
+        for name, about in has.items():
+            if about["sha256"] == digest:
+                return f"{whose}/{name}"
+    raise SystemExit(f"a run was made from {file}; accepted: a policy of the zoo, as it is now")
 
 
 def curve(run: RunDirectory) -> str:
@@ -287,6 +296,7 @@ def main() -> None:
             vehicle, kind = config.env.vehicle, config.task.name
             task = "race_any" if kind == "race" and config.task.own_worlds else kind
             task = "hover_rotors" if config.env.command_mode == "rotor_share" else task
+            task = "race_told" if kind == "race_eyes" and not config.env.cameras else task
             _, about = judged(vehicle, task, out, Path(folder), chosen=False)
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:

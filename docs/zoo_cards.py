@@ -31,6 +31,7 @@ TASKS = {
     "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "race_duel": "Race another, and touch neither it nor a gate ([how](many-vehicles.md#a-race-against-others)).",
     "race_eyes": "Fly a lap of one of four tracks by a camera and an IMU alone ([racing by eye](eyes.md)).",
+    "race_told": "The teacher of `race_eyes`: fly a lap of the same tracks by poses, at about 8.5 m/s.",
     "gap": "Fly through a narrow tilted slit, banked.",
     "hover_aware": "Fly to a point and keep a moving ball in view.",
     "hover_payload": "Hold a load, which hangs on a cable and is not seen, at a place.",

@@ -29,8 +29,8 @@ SNIPPETS = [
 ]
 
 
-def started(arguments: list[str], cwd: Path) -> "subprocess.CompletedProcess[str]":
-    environment = os.environ | {"XLA_FLAGS": QUICK}
+def started(arguments: list[str], cwd: Path, **environment: str) -> "subprocess.CompletedProcess[str]":
+    environment = os.environ | {"XLA_FLAGS": QUICK} | environment
     command = [sys.executable, *arguments]
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
 
@@ -57,7 +57,7 @@ def test_snippet_of_the_docs(code: str, tmp_path: Path) -> None:
         (tmp_path / "snippet.py").write_text(code, encoding="utf-8")
         done = run_script(tmp_path / "snippet.py", tmp_path)
     else:
-        done = started(["-c", code], tmp_path)
+        done = started(["-c", code], tmp_path, PYTHONPATH=str(ROOT / "benchmarks"))  # some extend what is there
     assert done.returncode == 0, done.stderr
 
 

@@ -21,16 +21,17 @@ from e2efly.runs.presets import begun, for_vehicle, preset
 from e2efly.simulation.physics import State
 
 
-def setup(task: str = "hover", env: dict[str, Any] | None = None, **algo: Any) -> Setup:
+def setup(task: str = "hover", env: dict[str, Any] | None = None, recurrent: int = 0, **algo: Any) -> Setup:
     config = preset(task, "dagger", "nominal")
     settings = dataclasses.replace(config.algo, **({"envs": 64, "horizon": 16} | algo))
-    return Setup.of(dataclasses.replace(config, algo=settings, env=dataclasses.replace(config.env, **(env or {}))))
+    network = dataclasses.replace(config.network, recurrent=recurrent or config.network.recurrent)
+    env_config = dataclasses.replace(config.env, **(env or {}))
+    return Setup.of(dataclasses.replace(config, algo=settings, env=env_config, network=network))
 
 
-def test_it_learns_what_the_teacher_does_without_being_told_the_same() -> None:
-    made = setup(led=0.25, env={"past_actions": 4}, horizon=48)  # five windows in an episode
+def learned(made: Setup, updates: int) -> dict[str, np.ndarray]:
+    """The metrics of a short training."""
     algorithm, env, config = made.algorithm, made.env, made.config.algo
-    updates = 400
 
     def run(start: Any) -> Any:
         def update(state: Any, i: Any) -> Any:
@@ -39,10 +40,22 @@ def test_it_learns_what_the_teacher_does_without_being_told_the_same() -> None:
         state = begin(algorithm, env, config, made.parameters(), own(start))
         return stacked(jax.lax.scan(update, state, jnp.arange(updates))[1])
 
-    metrics = jax.tree.map(lambda x: x[0], on_each(run, 1, (OWN,), OWN)(stacked(random_key(0))))
-    error, success = (np.asarray(metrics[name]) for name in ("loss/imitation", "train_success"))
+    metrics = on_each(run, 1, (OWN,), OWN)(stacked(random_key(0)))
+    return {name: np.asarray(x[0]) for name, x in metrics.items()}
+
+
+def test_it_learns_what_the_teacher_does_without_being_told_the_same() -> None:
+    found = learned(setup(led=0.25, env={"past_actions": 4}, horizon=48), 400)  # five windows in an episode
+    error, success = found["loss/imitation"], found["train_success"]
     assert error[-20:].mean() < 0.4 * error[:5].mean()
     assert success[-20:].max() > 0.9, "it flies by what it has learned"
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.0])
+def test_what_the_teacher_sees_is_read_from_the_memory_if_that_is_asked_for(weight: float) -> None:
+    made = setup(led=1.0, env={"past_actions": 4}, recurrent=64, reconstruction=weight)
+    error = learned(made, 150)["loss/reconstruction"]
+    assert (error[-20:].mean() < 0.5 * error[:5].mean()) == (weight > 0)
 
 
 def test_a_teacher_flies_as_its_file_does() -> None:
@@ -96,7 +109,7 @@ def test_by_default_the_teacher_is_the_zoos_policy_of_the_task() -> None:
 
 def test_a_run_keeps_the_file_of_its_teacher_that_of_its_vehicle() -> None:
     config = preset("race_eyes", "dagger", "nominal")
-    assert input_files(begun(config))["algo.teacher"] == policy_file("race_any").absolute()
+    assert input_files(begun(config))["algo.teacher"] == policy_file("race_told").absolute()
     other = for_vehicle(preset("race", "dagger", "nominal"), "crazyflie")
     assert input_files(begun(other))["algo.teacher"] == policy_file("race", "crazyflie").absolute()
     taught = dataclasses.replace(config, algo=DAggerConfig(teacher="expert"))

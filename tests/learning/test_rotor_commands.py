@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from e2efly.adapters.gym import QuadrotorEnv, QuadrotorVectorEnv
-from e2efly.config import ALGORITHMS, EnvConfig, TrainConfig
+from e2efly.config import ALGORITHMS, DAggerConfig, EnvConfig, TrainConfig
 from e2efly.environment import Env, random_key
 from e2efly.learning.algorithm import TrainState
 from e2efly.learning.devices import OWN, SAME, on_each, own, stacked
@@ -91,9 +91,13 @@ def test_its_c_code_is_the_policy(tmp_path: Path, vehicle: str) -> None:
 
 @pytest.mark.whole(but=2)
 @pytest.mark.parametrize("algo", list(ALGORITHMS))
-def test_each_algorithm_learns_a_number_for_each_rotor(algo: str) -> None:
+def test_each_algorithm_learns_a_number_for_each_rotor(tmp_path: Path, algo: str) -> None:
     """Its update is traced, which finds every array of another shape."""
-    setup = Setup.of(configured("hexa", algo)[0])
+    config = configured("hexa", algo)[0]
+    if isinstance(config.algo, DAggerConfig):
+        teacher = dataclasses.replace(config.algo, teacher=str(policy_of(tmp_path, "hexa")))
+        config = dataclasses.replace(config, algo=teacher)
+    setup = Setup.of(config)
     parameters = setup.parameters()
     assert parameters.policy.head[-1][1].shape == (6,)
     state = start_program(setup).trace(setup.env, parameters, random_key(0)).out_info
