@@ -20,7 +20,7 @@ OTHERS = (
     "mavlink", "crazyflie", "scorecards",
     "scorecards --vehicle crazyflie --flown policy --policies raptor any/hover_rotors any/hover",
     "expert", "visual_tasks", "ablation", "stable_baselines3_ppo", "thrown_starts", "thrown", "any_vehicle", "raptor",
-    "multirotor", "eyes", "eyes --rows --flights 40", "eyes --firmware 5",
+    "multirotor", "eyes", "eyes --rows --flights 40", "eyes --firmware 5", "race_eyes",
     "gate_renders", "gate_masks --train 4850", "eyes --colours gates.onnx", "exchanges",
     "identify", "identify --plant structure --bare --first 1010", "step_response",
     "step_alignment", "step_alignment --plant betaflight --vehicles 6",

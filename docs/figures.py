@@ -58,6 +58,7 @@ TITLES = {
     "identify_structure_plain": "The same, fitted by a model without that structure",
     "tune": "From the log of a flight to a policy: hidden vehicles far from their file",
     "eyes": "Races by a camera and an IMU alone",
+    "race_eyes": "The same end to end",
     "step_response": "Steps of the real firmware, and the simulator's before and after alignment",
     "step_alignment": "Alignment of hidden vehicles by a flight of steps",
     "identify_betaflight": "Identification of hidden vehicles behind the real firmware",
@@ -94,7 +95,7 @@ POLICIES = {
     **dict.fromkeys(
         (
             "zoo_stress_gap_hover_aware", "zoo_stress_by_sight", "any_vehicle", "airsim", "firmware_flights",
-            "multirotor", "eyes",
+            "multirotor", "eyes", "race_eyes",
             "firmware_vehicles", "room_flights", "controllers", "filter", "plants_by_sight", "image_faults",
             "hil_rehearsal", "hil_room", "fault_campaign", "onboard", "c_export", "race_speed",
         ),
@@ -202,6 +203,11 @@ No motion capture: the pose source `gates:` tells the vehicle where it is. Of ea
 degrees askew, images 20 to 60 ms old, a rolling shutter, lost images, gates that stand 2 cm from the map, and an IMU
 with noise and biases. Tracks on MuJoCo; then rows that the estimator was not made for (its own size of four_gates), and
 the stress test; last, whole flights through the real firmware. [How it is done](eyes.md).""",
+    "race_eyes": """
+One network, told neither where it is nor how fast it flies: the zoo's `race_eyes`. Each track, one lap: with the
+vehicle of the file, with vehicles, air and cameras as its training draws them, on MuJoCo, and on the plant of the real
+firmware. Then rows of the stress test. Last, whole flights of three laps through the real firmware.
+[How it is done](eyes.md#end-to-end).""",
     "gate_masks": """
 Whole pictures of 640 x 360 pixels, gates among poles, beams, blocks and walls. Of the looks kept apart, neither
 textures nor sun, bars, panels and seeds are those of the training. A gate can be seen if two corners of its opening

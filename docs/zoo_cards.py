@@ -18,6 +18,7 @@ from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.zoo import USUAL, config_file, contents, policy_file
 from e2efly.runs import presets
 from e2efly.runs.inputs import from_json
+from e2efly.tasks import registry
 from e2efly.vehicles.family import load_family
 
 DOCS = Path(__file__).parent
@@ -31,7 +32,7 @@ TASKS = {
     "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "race_duel": "Race another, and touch neither it nor a gate ([how](many-vehicles.md#a-race-against-others)).",
     "race_eyes": "Fly a lap of one of four tracks by a camera and an IMU alone ([racing by eye](eyes.md)).",
-    "race_told": "The teacher of `race_eyes`: fly a lap of the same tracks by poses, at about 8.5 m/s.",
+    "race_told": "The teacher of `race_eyes`: fly a lap of the same tracks by poses, at about 9 m/s.",
     "gap": "Fly through a narrow tilted slit, banked.",
     "hover_aware": "Fly to a point and keep a moving ball in view.",
     "hover_payload": "Hold a load, which hangs on a cable and is not seen, at a place.",
@@ -42,6 +43,8 @@ TASKS = {
     "race_clutter": "Race among obstacles that only a depth camera shows.",
     "race_clutter_room": "The same in a room of 6x6 m, at the speed of a room ([a small room](hil.md#a-small-room)).",
 }
+OF = {"race_any": "race", "hover_rotors": "hover", "race_told": "race_eyes"}
+"""The task of a policy by a preset of its own."""
 VEHICLES = {
     "any": "Any quadrotor",
     "crazyflie": "Crazyflie",
@@ -140,8 +143,9 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     """The lines of one policy's card."""
     name = f"{vehicle}/{task}"
     policy = policy_file(name)
-    kind = task.removesuffix("_any").removesuffix("_rotors")
+    kind = OF.get(task, task)
     options = "" if vehicle == USUAL else f" --vehicle {vehicle}"
+    options += "" if about["algorithm"] == registry.TASKS[kind].best else f" --algo {about['algorithm']}"
     preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
     stress = about.get("stress", {})
     lines = [f"### {name}", "", TASKS[task]]

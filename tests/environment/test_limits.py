@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from e2efly.config import EnvConfig, EstimateConfig, LinkConfig
+from e2efly.environment import Env
 from e2efly.environment.limits import sensing_of
 from e2efly.policy.contract import SENSING
 from e2efly.policy.loader import load_policy
@@ -36,3 +37,18 @@ def test_an_exported_policy_says_what_its_training_covered(tmp_path: Path) -> No
     contract = load_policy(made(tmp_path / "policy.onnx", 0.1, config=config)).contract
     assert contract.sensing == sensing_of(config.env, contract.latency_range_s, contract.control_rate_hz)
     assert {part.name: part.high for part in contract.sensing or ()}["pose_age"] == pytest.approx(0.08)
+
+
+@pytest.mark.parametrize(
+    ("given", "own"), [(None, 0.06), ((0.01, 0.09), 0.06), ((0.01, 0.03), 0.02), ((0.08, 0.1), 0.09)]
+)
+def test_by_itself_a_vehicle_has_a_latency_that_its_training_has(
+    tmp_path: Path, given: tuple[float, float] | None, own: float
+) -> None:
+    """In the simulator without disturbances, in the rows of the stress and in the contract, whatever its file says."""
+    config = presets.preset("hover", "ppo")
+    config = dataclasses.replace(config, env=dataclasses.replace(config.env, action_latency=given))
+    env = Env.of(config.task, config.reward, config.env)
+    assert env.latency == pytest.approx(own)
+    assert env.undisturbed().latency_range == pytest.approx(own)
+    assert load_policy(made(tmp_path / "policy.onnx", 0.1, config=config)).contract.latency_s == pytest.approx(own)

@@ -123,7 +123,7 @@ def test_rows_of_cameras_change_what_the_plant_sees() -> None:
     starts, vehicle = draw_starts(env, 3, SEED), load_vehicle("vis_r")
 
     def seen(row: str, at: int = 0) -> np.ndarray:
-        sight = starts.sights(env, 0, draws(ROWS[row], vehicle, SEED, 3).camera)[at]
+        sight = starts.sights(env, 0, draws(ROWS[row], vehicle, vehicle.latency, SEED, 3).camera)[at]
         assert sight is not None
         moved = dataclasses.replace(starts.states[at], position=starts.states[at].position + np.array([2.0, 0, 0]))
         watch = sight.begin()

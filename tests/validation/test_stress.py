@@ -26,7 +26,7 @@ N = 4000
 
 
 def drawn(row: str, n: int = N, dtype: type = np.float64) -> Draw:
-    draw = Draw.of(ROWS[row], VIS_R, np.random.default_rng(0), n)
+    draw = Draw.of(ROWS[row], VIS_R, VIS_R.latency, np.random.default_rng(0), n)
     return jax.tree.map(lambda x: np.asarray(x, dtype), draw)
 
 

@@ -134,14 +134,14 @@ def short() -> tuple[Env, Act]:
 
 def under(name: str | None, short: tuple[Env, Act]) -> Any:
     env, act = short
-    draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw_of(ROWS["nominal"], VIS_R, 1, 0))
+    draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw_of(ROWS["nominal"], VIS_R, VIS_R.latency, 1, 0))
     whole = steps_of(None, setting(BATCH, 15)) if name is None else law_of(LAWS[name], VIS_R, 1, 0, 15, PERIOD)
     return fly_law(draw.env(env), act, random_key(1), draw, whole, 0.0)
 
 
 def test_a_flight_without_a_law_is_the_nominal_row(short: tuple[Env, Act]) -> None:
     env, act = short
-    draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw_of(ROWS["nominal"], VIS_R, 1, 0))
+    draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw_of(ROWS["nominal"], VIS_R, VIS_R.latency, 1, 0))
     plain = run_stepwise(draw.env(env), act, random_key(1), BATCH, 15, 0.0, lambda state: draw.state(env, state))[0]
     for a, b in zip(jax.tree.leaves(plain), jax.tree.leaves(under(None, short)), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)

@@ -56,7 +56,7 @@ def test_a_row_is_the_same_as_in_eval(plant: str, close: float, wanted: Report, 
 
 def test_air_and_noise_are_as_strong_as_the_rows_say() -> None:
     vehicle, steps, period = load_vehicle("vis_r"), 600, 1 / 30
-    met = {row: realities(draws(ROWS[row], vehicle, 1, 40), vehicle, 1, steps, period) for row in ROWS}
+    met = {row: realities(draws(ROWS[row], vehicle, vehicle.latency, 1, 40), vehicle, 1, steps, period) for row in ROWS}
     for row, flights in met.items():
         still = ROWS[row].alters.isdisjoint({"wind", "rotor_share"})
         for flight in flights:
@@ -74,7 +74,7 @@ def test_air_and_noise_are_as_strong_as_the_rows_say() -> None:
     drift = np.array([a.error[:, 0:3] for a in air["noise and drift of a VIO"]])
     assert np.std(drift[:, -1]) == pytest.approx(np.hypot(0.005 * np.sqrt(steps * period), 0.02), rel=0.2)
     # the draws of few flights are those of the first of many
-    few = realities(draws(ROWS[ALL], vehicle, 1, 3), vehicle, 1, steps, period)
+    few = realities(draws(ROWS[ALL], vehicle, vehicle.latency, 1, 3), vehicle, 1, steps, period)
     assert [flight.body.mass for flight in few] == [flight.body.mass for flight in met[ALL][:3]]
 
 

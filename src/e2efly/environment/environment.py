@@ -46,7 +46,7 @@ from e2efly.environment.env_state import (
     pushed,
     where,
 )
-from e2efly.environment.limits import latencies_of, limits_of, posterior_of
+from e2efly.environment.limits import latencies_of, limits_of, nominal_latency, posterior_of
 from e2efly.environment.privileged import OTHER_SIZE, SCENE_SIZE, of_others, of_scene
 from e2efly.environment.rules import check, hidden
 from e2efly.environment.signals import dangers, happened
@@ -265,11 +265,10 @@ class Env:
 
     def eased(self, strength: float) -> "Env":
         """The environment with a share of all that is drawn, except the cameras: only numbers differ."""
-        nominal = np.clip(np.asarray(self.physics.nominal.latency, self.latency_range.dtype), *self.latency_range)
-        late = np.stack([nominal + strength * (x - nominal) for x in self.latency_range])
+        late = np.stack([self.latency + strength * (x - self.latency) for x in self.latency_range])
         return dataclasses.replace(
             self,
-            latency_range=late.astype(late[0].dtype) if self.family is None else self.latency_range,
+            latency_range=late.astype(self.latency_range.dtype) if self.family is None else self.latency_range,
             randomize={name: strength * width for name, width in self.randomize.items()},
             posterior=self.posterior and self.posterior.times(strength),
             wind=self.wind and strength * self.wind,
@@ -310,6 +309,12 @@ class Env:
     def control_period(self) -> float:
         """Duration of a control step, s."""
         return self.physics.control_period
+
+    @property
+    def latency(self) -> float:
+        """Latency from observation to command of the vehicle of the file, s."""
+        own: Any = self.physics.flown.latency
+        return nominal_latency(float(own), (float(self.latency_range[0]), float(self.latency_range[1])))
 
     @property
     def agents(self) -> int:

@@ -53,6 +53,12 @@ def latencies_of(
     return max(low - sooner - margin, 0.0), high + later + margin
 
 
+def nominal_latency(own: float, latencies: Sequence[float]) -> float:
+    """The latency of a vehicle by itself, s: its own, if episodes may have it, otherwise the mean of theirs."""
+    low, high = latencies
+    return own if low <= own <= high else (low + high) / 2
+
+
 def vehicles_of(config: EnvConfig, vehicle: Vehicle, posterior: Posterior | None) -> Domain:
     """The ranges of the vehicles that episodes draw about one vehicle, for the contract of a policy.
 

@@ -40,7 +40,7 @@ class StressRow:
     factors: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     """Factors on fields of the vehicle."""
     latency: float = 0.0
-    """Time added to the vehicle's latency from observation to command, s. The sum is at least 0."""
+    """Time added to the latency from observation to command, s. The sum is at least 0."""
     wind: float = 0.0
     """Steady wind, m/s, from a random horizontal direction."""
     gust: float = 0.0
@@ -146,8 +146,10 @@ class Draw:
     """Fields of `LostCommands` but what arrived."""
 
     @staticmethod
-    def of(row: StressRow, vehicle: Vehicle, rng: np.random.Generator, n: int) -> "Draw":
-        """Draw n episodes of a row for a nominal vehicle; `ALL` draws every strength between the rows' extremes."""
+    def of(row: StressRow, vehicle: Vehicle, latency: float, rng: np.random.Generator, n: int) -> "Draw":
+        """Draw n episodes of a row for a nominal vehicle with a latency, s. `ALL` draws every strength between the
+        rows' extremes.
+        """
         rows, everything = tuple(ROWS.values()), row.name == ALL
 
         def strength(name: str) -> np.ndarray:
@@ -185,7 +187,7 @@ class Draw:
         }
         return Draw(
             plant=plant,
-            latency=np.maximum(vehicle.latency + strength("latency"), 0.0),
+            latency=np.maximum(latency + strength("latency"), 0.0),
             wind=strength("wind")[:, None] * np.stack([np.cos(angle), np.sin(angle), zero], axis=1),
             disturbance=Disturbance(
                 gust_speed=gust,

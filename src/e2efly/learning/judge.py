@@ -58,7 +58,7 @@ def stressed(setup: Setup, weights: Weights, episodes: int) -> dict[str, Episode
         )
 
     for name, env in setup.judges.items():
-        draw = Draw.of(ROWS[ALL], env.physics.nominal, rng, count)
+        draw = Draw.of(ROWS[ALL], env.physics.nominal, env.latency, rng, count)
         draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
         found = program(with_longer_queue(env), weights, random_key(0, REPORTED), draw)
         flown[name] = jax.tree.map(lambda x: np.asarray(x)[:episodes], found)

@@ -13,7 +13,7 @@ from e2efly.config import TrainConfig
 from e2efly.config.storage import write_atomically
 from e2efly.control import COMMAND_MODES
 from e2efly.environment import Env
-from e2efly.environment.limits import limits_of, posterior_of, sensing_of, vehicles_of
+from e2efly.environment.limits import limits_of, nominal_latency, posterior_of, sensing_of, vehicles_of
 from e2efly.learning.networks import FAINTEST, NEAREST, Actor, View, Weights
 from e2efly.learning.onnx_layers import policy_graph
 from e2efly.learning.raptor_actor import actor_of
@@ -65,7 +65,7 @@ def contract_of(env: Env, config: TrainConfig) -> Contract:
         vehicle_ranges=None if family is None else family.ranges,
         vehicles=None if family is not None else vehicles_of(about, vehicle, posterior_of(about)),
         control_rate_hz=float(rate),
-        latency_s=float(vehicle.latency) if latency[0] <= vehicle.latency <= latency[1] else sum(latency) / 2,
+        latency_s=nominal_latency(float(vehicle.latency), latency),
         latency_range_s=latency,
         observation_latency_range_s=_decimals(env.observation_latency_range),
         observation=env.fields,

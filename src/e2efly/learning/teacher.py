@@ -130,4 +130,4 @@ def _policy(policy: str) -> Teacher:
     actor = Actor.of(fields, (), network_of(file, loaded))
     like = actor.init(np.random.default_rng(0), np.asarray(loaded.contract.hover_action))
     weights = weights_of(file, loaded.content, like, actor)
-    return Teacher(loaded.contract, actor, jax.tree.map(jnp.asarray, weights))
+    return Teacher(loaded.contract, actor, jax.tree.map(np.asarray, weights))  # cached: nothing of a trace

@@ -102,7 +102,7 @@ def stress(
         begins = list(zip(starts.states, starts.courses, strict=True))
         asked = []
         for row in chosen:
-            drawn = draws(ROWS.get(row, ROWS["nominal"]), flown, seed, episodes)
+            drawn = draws(ROWS.get(row, ROWS["nominal"]), flown, env.latency, seed, episodes)
             meets = realities(drawn, flown, seed, steps, env.control_period)
             if told := told_law(drawn, flown, seed, steps, env.control_period):
                 meets = [dataclasses.replace(met, law=told.of(i)) for i, met in enumerate(meets)]

@@ -151,7 +151,7 @@ def fly_rows(found: Candidate, rows: tuple[str, ...], episodes: int, seed: int) 
         for row in rows:
             parts = []
             for i in range(-(-episodes // size)):
-                draw = draw_of(ROWS.get(row, ROWS["nominal"]), env.physics.flown, seed, i, size)
+                draw = draw_of(ROWS.get(row, ROWS["nominal"]), env.physics.flown, env.latency, seed, i, size)
                 draw = jax.tree.map(lambda x: np.asarray(x, np.float32), draw)
                 key, act = random_key(seed, UNSEEN, i), act_of(found.policy)
                 if row in LAWS:
@@ -248,13 +248,13 @@ def law_of(
     return steps_of(law, LawSetting(vehicle, rng, size, steps, period))
 
 
-def draws(row: StressRow, vehicle: Vehicle, seed: int, n: int) -> Draw:
+def draws(row: StressRow, vehicle: Vehicle, latency: float, seed: int, n: int) -> Draw:
     """The first n episodes of a row for the seed of the starts. They do not depend on the number of episodes."""
-    batches = [draw_of(row, vehicle, seed, i) for i in range(-(-n // BATCH))]
+    batches = [draw_of(row, vehicle, latency, seed, i) for i in range(-(-n // BATCH))]
     return jax.tree.map(lambda *x: np.concatenate(x)[:n], *batches)
 
 
-def draw_of(row: StressRow, vehicle: Vehicle, seed: int, batch: int, size: int = BATCH) -> Draw:
+def draw_of(row: StressRow, vehicle: Vehicle, latency: float, seed: int, batch: int, size: int = BATCH) -> Draw:
     """A batch of episodes of a row."""
     rng = np.random.default_rng([seed, UNSEEN, batch, list(ROWS).index(row.name)])
-    return Draw.of(row, vehicle, rng, size)
+    return Draw.of(row, vehicle, latency, rng, size)
