@@ -11,6 +11,7 @@ from typing import Any
 
 from common import arguments, table, write
 
+from e2efly.config import EnvConfig
 from e2efly.config.changes import differing
 from e2efly.environment.episodes import summary
 from e2efly.environment.stress_rows import ALL
@@ -51,8 +52,8 @@ def main() -> None:
 
 def tracks(nominal: dict[str, Any], args: Any) -> list[dict[str, Any]]:
     """Each track: with the vehicle of the file, as the training draws vehicles and cameras, and on plants."""
-    own = candidate(args.policy).env
-    drawn = {name: value for name, (_, value) in differing(own, ABOUT).items()}
+    calm = EnvConfig(cameras=candidate(args.policy).env.cameras)
+    drawn = {name: value for name, (_, value) in differing(calm, ABOUT).items()}
     random = evaluate(args.policy, args.episodes, seed=args.seed, env=drawn).flown
     plants = {plant: validate(args.policy, plant, args.flights, seed=args.seed) for plant in ("mujoco", "betaflight")}
     return [

@@ -36,7 +36,7 @@ from tests.conftest import QUICK, NetworkTrace
 USUALLY = {"xla_backend_optimization_level": 3}
 """XLA's own, instead of `QUICK`: images take longer to draw than their program takes to compile."""
 POLICIES = [(vehicle, task) for vehicle, tasks in contents().items() for task in tasks]
-LATER = {"hall", "avoid_together", "swap", "race_eyes"}
+LATER = {"hall", "avoid_together", "swap"}
 """Tasks of which no policy is good enough yet."""
 
 

@@ -114,7 +114,7 @@ class RaceEyesConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """The policy of the preset `told` is imitated. Other algorithms have its rewards, or those of `race_speed`."""
+        """The zoo's policy of the preset `told` is imitated. The other algorithms have rewards."""
         settings: AlgorithmConfig = DAggerConfig(teacher="race_told", reconstruction=0.2)
         weights = {"progway": 2.0, "fitlog": 40.0, "overspeed": 0.03, "anglev_sq": 0.0005, "act2_sq": 0.005}
         if algo == "bptt":
@@ -133,7 +133,9 @@ class RaceEyesConfig(TaskConfig):
 
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
-        """`told`: without a camera. The policy knows where it is, where the gates are, and how fast it flies."""
+        """`told`: without a camera. The policy knows where it is, where the gates are, and how fast it flies. Progress
+        does not weigh more than it has to: a teacher that turns fast has a learner that sees nothing.
+        """
         return dataclasses.replace(
             config,
             task=dataclasses.replace(config.task, observes=None),
