@@ -7,6 +7,7 @@ firmware. `--whole` flights take off, fly three laps of four_gates or of circle_
 their place by motion capture but for the policy. Rows of the stress have a quarter of the starts.
 """
 
+import dataclasses
 from typing import Any
 
 from common import arguments, table, write
@@ -19,6 +20,7 @@ from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.simulation.device import compute_at_once, prepare
 from e2efly.tasks.race_eyes import ABOUT
+from e2efly.tasks.route import usual_route
 from e2efly.validation import firmware_program
 from e2efly.validation.candidate import candidate
 from e2efly.validation.evaluation import evaluate
@@ -83,11 +85,15 @@ def rows(flown: dict[str, dict[str, Any]]) -> list[dict[str, str]]:
 def whole(args: Any) -> list[dict[str, str]]:
     """Whole flights through the firmware."""
     policy, vehicle, made = load_policy(policy_file(args.policy)), load_vehicle("vis_r"), []
+    usual: Any = usual_route(policy.contract)
     for track in LAPPED:
         asked = candidate(args.policy, task={"track": (track,), "laps": 3, "episode_s": 40.0})
         env = asked.environment(*asked.task.criteria().values())
+        route = dataclasses.replace(usual, outside=True, **(usual.whole | {"track": track, "laps": 3}))
         flights = [
-            rehearse(firmware_program.chosen(), policy, vehicle, seed=seed, scenery=Scenery.draw(env, seed))
+            rehearse(
+                firmware_program.chosen(), policy, vehicle, seed=seed, scenery=Scenery.draw(env, seed), route=route
+            )
             for seed in range(args.seed, args.seed + args.whole)
         ]
         made.append({
