@@ -96,10 +96,11 @@ class CProgram:
     def step(
         self, about: str, lines: Sequence[str], reads: Sequence[Operand], writes: Operand, *, in_place: bool = False
     ) -> None:
-        """Add a step."""
+        """Add a step. One that writes no number is left out: C has no empty arrays."""
         read = frozenset(operand.buffer for operand in reads if operand.buffer is not None)
         assert writes.buffer is not None
-        self.steps.append(CStep(about, lines, read, writes.buffer, in_place))
+        if writes.size:
+            self.steps.append(CStep(about, lines, read, writes.buffer, in_place))
 
 
 def layout(program: CProgram, kept: Iterable[int]) -> tuple[list[int], int]:
