@@ -82,11 +82,8 @@ class DAgger(Algorithm):
             first = RolloutState.of(state), state.replay
             end, (errors, record) = jax.lax.scan(step, first, None, length=config.horizon)
             errors = jax.tree.map(jnp.mean, errors)
-            return errors["imitation"] + config.reconstruction * errors["reconstruction"], (
-                end,
-                errors,
-                record.metrics(),
-            )
+            error = errors["imitation"] + config.reconstruction * errors["reconstruction"]
+            return error, (end, errors, record.metrics())
 
         gradient, ((end, remembered), errors, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
         parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, gradient)
