@@ -43,6 +43,7 @@ import numpy as np
 import onnx
 from common import arguments, table
 
+from e2efly.config import TrainConfig
 from e2efly.config.algorithms import EXPERT
 from e2efly.config.storage import write_json
 from e2efly.environment.limits import posterior_of, sensing_of, vehicles_of
@@ -52,7 +53,7 @@ from e2efly.learning.judge import worst_success
 from e2efly.learning.onnx_export import write_policy
 from e2efly.policy.loader import load_policy
 from e2efly.policy.onnx_file import is_sealed
-from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file
+from e2efly.policy.zoo import FOLDER, USUAL, config_file, contents, curve_file, shipped_name
 from e2efly.runs import presets
 from e2efly.runs.inputs import from_json, to_json
 from e2efly.runs.rundir import RunDirectory
@@ -186,13 +187,20 @@ def keep(vehicle: str, task: str, policy: Path, about: dict[str, Any]) -> dict[s
     return line
 
 
+def named(config: TrainConfig) -> str:
+    """The name of a run's policy: its task, or the variant whose preset has the same task, commands and cameras."""
+
+    def flies(config: TrainConfig) -> tuple[Any, ...]:
+        return config.task, config.env.command_mode, config.env.cameras
+
+    variants = ((name, presets.preset(task, algo, preset)) for name, (task, preset, algo) in VARIANTS.items())
+    return next((name for name, its in variants if flies(its) == flies(config)), config.task.name)
+
+
 def of_the_zoo(file: str) -> str:
     """The name of a policy of the zoo, wherever the zoo is."""
-    digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-    for whose, has in contents().items():
-        for name, about in has.items():
-            if about["sha256"] == digest:
-                return f"{whose}/{name}"
+    if name := shipped_name(Path(file).read_bytes()):
+        return name
     raise SystemExit(f"a run was made from {file}; accepted: a policy of the zoo, as it is now")
 
 
@@ -293,10 +301,7 @@ def main() -> None:
     for out in map(Path, options.runs):
         with tempfile.TemporaryDirectory() as folder:
             config = RunDirectory(out).config()
-            vehicle, kind = config.env.vehicle, config.task.name
-            task = "race_any" if kind == "race" and config.task.own_worlds else kind
-            task = "hover_rotors" if config.env.command_mode == "rotor_share" else task
-            task = "race_told" if kind == "race_eyes" and not config.env.cameras else task
+            vehicle, task = config.env.vehicle, named(config)
             _, about = judged(vehicle, task, out, Path(folder), chosen=False)
             rows.append(keep(vehicle, task, out / "policy.onnx", about))
     for vehicle in () if options.runs else options.vehicles:

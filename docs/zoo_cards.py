@@ -18,7 +18,6 @@ from e2efly.policy.loader import Policy, load_policy
 from e2efly.policy.zoo import USUAL, config_file, contents, policy_file
 from e2efly.runs import presets
 from e2efly.runs.inputs import from_json
-from e2efly.tasks import registry
 from e2efly.vehicles.family import load_family
 
 DOCS = Path(__file__).parent
@@ -43,8 +42,6 @@ TASKS = {
     "race_clutter": "Race among obstacles that only a depth camera shows.",
     "race_clutter_room": "The same in a room of 6x6 m, at the speed of a room ([a small room](hil.md#a-small-room)).",
 }
-OF = {"race_any": "race", "hover_rotors": "hover", "race_told": "race_eyes"}
-"""The task of a policy by a preset of its own."""
 VEHICLES = {
     "any": "Any quadrotor",
     "crazyflie": "Crazyflie",
@@ -143,9 +140,10 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     """The lines of one policy's card."""
     name = f"{vehicle}/{task}"
     policy = policy_file(name)
-    kind = OF.get(task, task)
+    config = configured(policy)
+    kind = config.task.name
     options = "" if vehicle == USUAL else f" --vehicle {vehicle}"
-    options += "" if about["algorithm"] == registry.TASKS[kind].best else f" --algo {about['algorithm']}"
+    options += "" if about["algorithm"] == config.task.best else f" --algo {about['algorithm']}"
     preset = "" if about["preset"] == "robust" else f" --preset {about['preset']}"
     stress = about.get("stress", {})
     lines = [f"### {name}", "", TASKS[task]]
@@ -173,7 +171,7 @@ def card(vehicle: str, task: str, about: dict[str, Any]) -> list[str]:
     lines += [f"| camera {image.name} | {image.mount} |" for image in load_policy(policy).contract.images]
     if courses := load_policy(policy).contract.courses:
         lines.append(f"| trained for | {', '.join(map(str, courses))} |")
-    trained = made_by(f"train {kind}{options}{preset} --seed {about['seed']}", configured(policy))
+    trained = made_by(f"train {kind}{options}{preset} --seed {about['seed']}", config)
     lines.append(f"| trained by | {trained}, {about['env_steps'] / 1e6:.1f} million steps |")
     lines.append(f"| file | {policy.stat().st_size / 1000:.0f} kB, SHA-256 `{about['sha256'][:16]}...` |")
     return [*lines, ""]

@@ -16,7 +16,7 @@ from e2efly.policy.contract import METADATA_KEY, Contract
 from e2efly.policy.onnx_file import METADATA, Message, check_seal, file_content, is_sealed, read, sealed, write
 from e2efly.policy.onnx_graph import FLOAT, IR_VERSION, OPSET, TYPES, check
 from e2efly.policy.onnx_session import open_session
-from e2efly.policy.zoo import is_shipped, policy_file
+from e2efly.policy.zoo import policy_file, shipped_name
 from e2efly.vehicles.loading import load_vehicle, vehicle_names
 from e2efly.vehicles.vehicle import Vehicle
 
@@ -202,7 +202,7 @@ def _policy(where: str, content: bytes) -> Policy:
         checked = write(model)
         level, images = level_and_still(contract), [np.zeros(image.shape, np.float32) for image in contract.images]
         tried = [level, *images, *([np.zeros(contract.memory_size, np.float32)] if contract.memory_size else [])]
-        session = open_session(checked, [x[None] for x in tried], trusted=is_shipped(content))
+        session = open_session(checked, [x[None] for x in tried], trusted=shipped_name(content) is not None)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
     policy = Policy(contract, session, checked)

@@ -86,14 +86,15 @@ def _entry(path: Path) -> tuple[str, str] | None:
     return (whose, task) if task in tasks else None
 
 
-def is_shipped(content: bytes) -> bool:
-    """Whether these bytes are a policy of the zoo, wherever they were read.
+def shipped_name(content: bytes) -> str | None:
+    """The name of the policy of the zoo that these bytes are, wherever they were read. None: they are none.
 
     Raises:
         ValueError: where the package's file is damaged.
     """
     digest = hashlib.sha256(content).hexdigest()
-    return any(about.get("sha256") == digest for tasks in contents().values() for about in tasks.values())
+    every = ((f"{whose}/{task}", about) for whose, tasks in contents().items() for task, about in tasks.items())
+    return next((name for name, about in every if about.get("sha256") == digest), None)
 
 
 def curve_file(policy: Path) -> Path:

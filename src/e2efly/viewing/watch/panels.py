@@ -188,7 +188,7 @@ def hands_on(panel: Panel, simulation: "Simulation") -> None:
             panel.slider(f"Wind {name} (m/s)", -LARGEST_WIND, LARGEST_WIND, 0.5, 0.0, partial(blow, axis))
         panel.slider("Mass (%)", 50, 200, 5, 100, lambda x: change(mass=x / 100))
         panel.slider("Thrust (%)", 50, 150, 5, 100, lambda x: change(thrust=x / 100))
-        nominal = 1e3 * float(simulation.vehicle.latency)
+        nominal = 1e3 * simulation.env.latency
         panel.slider("Delay (ms)", 0, 1e3 * LATEST, 5, 5 * round(nominal / 5), lambda x: change(delay=x / 1e3))
     _drag(panel, simulation)
 
