@@ -11,12 +11,14 @@ import pytest
 from e2efly.config import EnvConfig, RewardConfig
 from e2efly.environment import Env, random_key
 from e2efly.learning.devices import share
+from e2efly.learning.onnx_export import contract_of
 from e2efly.learning.setup import Setup
 from e2efly.policy.others import FAR, nobody
 from e2efly.runs import presets
 from e2efly.simulation.physics import State
 from e2efly.simulation.scenes.scene import gaps
 from e2efly.tasks import company
+from e2efly.tasks.route import fields_of
 from e2efly.tasks.swap import SwapConfig
 from e2efly.tasks.swap.goal import SwapGoal, SwapMemory
 from e2efly.tasks.swap.pilot import way
@@ -212,6 +214,28 @@ class TestSwap:
             memory = SwapMemory(np.asarray(state.memory.place)[i : i + 1], np.zeros(1), others)
             shown = goal.observe(memory, np.zeros(1), vehicle)
             np.testing.assert_allclose(shown[0], observation[i, : shown.shape[1]], atol=1e-5)
+
+    def test_by_depth_the_others_are_seen_and_not_told(self) -> None:
+        """The preset `depth`: the image changes with the others, and the contract asks for no pose of theirs."""
+        setup = Setup.of(presets.preset("swap", "bptt", "depth"))
+        contract = contract_of(setup.env, setup.config)
+        fields = [field.name for field in contract.observation]
+        assert contract.others is None and contract.neighbours == 0 and len(contract.images) == 1
+        assert fields == ["position_error", "attitude", "velocity", "body_rate", "past_actions"]
+        assert fields_of(contract) == contract.observation[:1]
+        state, observation = setup.env.reset(random_key(0), 8)
+        assert observation.shape[1] == contract.observation_size
+        alone = dataclasses.replace(state.memory, bodies=nobody(state.vehicle.position, 7))
+        among = setup.env.look(state, jnp.ones(8, bool)).images[0]
+        empty = setup.env.look(dataclasses.replace(state, memory=alone), jnp.ones(8, bool)).images[0]
+        assert np.all(np.max(np.asarray(empty - among), axis=(1, 2)) > 0.3)
+
+    @pytest.mark.parametrize("task", ["swap", "race_duel"])
+    def test_what_the_options_hide_is_not_observed(self, task: str) -> None:
+        config = presets.preset(task, "bptt")
+        hides = dataclasses.replace(config.task, observes=("others", "attitude"))
+        env = Env.of(hides, config.reward, config.env)
+        assert [field.name for field in env.fields] == ["others", "attitude"]
 
     def test_the_reward_sees_the_others(self) -> None:
         env = environment(agents=2)

@@ -58,6 +58,23 @@ def refuse_unknown(given: Sequence[str], command: str, actions: Sequence[argpars
         raise ValueError(f"unknown option {argument!r}{guess} (`e2efly {command} --help-all` lists all options)")
 
 
+def refuse_repeated(flags: Sequence[str], actions: Sequence[argparse.Action]) -> None:
+    """Refuse an option that is given twice, of which only the last would count.
+
+    Raises:
+        ValueError: naming it.
+    """
+    known = {flag: action for action in actions for flag in action.option_strings}
+    seen: set[str] = set()
+    for flag in flags:
+        action = known.get(flag)
+        if action is None or isinstance(action, argparse._AppendAction):
+            continue
+        if action.dest in seen:
+            raise ValueError(f"{flag} is given twice; accepted: once, with all of its values after it")
+        seen.add(action.dest)
+
+
 def similar(name: str, actions: Sequence[argparse.Action]) -> list[str]:
     """The options that are most similar to a name, best first: by spelling, by their words or the initials of these,
     or because the name is one of the option's values.

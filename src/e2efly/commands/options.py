@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast, get_type_hints
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from e2efly.commands.helping import NAMES, accepted, asks_help, names, refuse_unknown, short_help
+from e2efly.commands.helping import NAMES, accepted, asks_help, names, refuse_repeated, refuse_unknown, short_help
 from e2efly.vehicles.posterior import IDENTIFIED
 
 T = TypeVar("T")
@@ -63,6 +63,9 @@ def parse(options: type[T], command: str, arguments: list[str], **default: Any) 
         print(short_help(options.__doc__ or "", command, accepted(options, given)))
         raise SystemExit(0)
     arguments = ["--help" if argument == "--help-all" else argument for argument in _once(arguments)]
+    flags = [argument.split("=")[0].replace("_", "-") for argument in arguments if argument.startswith("--")]
+    if len(set(flags)) < len(flags):
+        refuse_repeated(flags, accepted(options, given))
     told, left = io.StringIO(), [argument for argument in arguments if argument.startswith("--")]
     try:
         with redirect_stderr(told):

@@ -86,9 +86,9 @@ def hidden(options: TaskConfig, task: Any, own: Sequence[Field]) -> tuple[str, .
     """
     if options.observes is None:
         return ()
-    rows = getattr(task, "observation", None)
-    shown = task.fields if rows is None else [field for field, _ in rows]
-    known = {field.name: field for field in (*shown, *own)}
+    rows = getattr(task, "observable", None)
+    offered = task.fields if rows is None else [field for field, _ in rows]
+    known = {field.name: field for field in (*offered, *own)}
     if strange := [name for name in options.observes if name not in known]:
         raise ValueError(f"task.observes has {', '.join(strange)}; accepted: some of {', '.join(known)}")
     needed = next(field.name for field in known.values() if field.frame == "world_body")

@@ -118,10 +118,15 @@ class Goal:
         return dataclasses.replace(self, config=options)  # type: ignore[type-var]
 
     @property
+    def observable(self) -> tuple[Observed, ...]:
+        """The task's own observation fields that there are. A task overrides it if its options decide on them."""
+        return self.observation
+
+    @property
     def shown(self) -> tuple[Observed, ...]:
-        """The task's own observation fields that its options show."""
+        """Those that its options show."""
         shows = getattr(self.config, "shows", None)
-        return tuple(row for row in self.observation if shows is None or shows(row[0].name))
+        return tuple(row for row in self.observable if shows is None or shows(row[0].name))
 
     @property
     def fields(self) -> tuple[Field, ...]:

@@ -84,7 +84,7 @@ class RaceDuelGoal(Racing):
         return memory.others.motion(body)
 
     @property
-    def shown(self) -> tuple[Observed, ...]:
+    def observable(self) -> tuple[Observed, ...]:
         """What a racer alone observes, and the nearest others."""
         (gates, _), cls = RaceGoal.observation[0], RaceDuelGoal
         where, motion = others_fields(self.config.neighbours)

@@ -7,7 +7,9 @@ from typing import ClassVar
 
 from e2efly.config import (
     BPTTConfig,
-    DAggerConfig,
+    CameraConfig,
+    EnvConfig,
+    ImageNoiseConfig,
     NetworkConfig,
     PPOConfig,
     RewardConfig,
@@ -18,6 +20,14 @@ from e2efly.config import (
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.tasks.registry import register
+
+RING = CameraConfig(
+    "range", width=64, height=16, projection="spherical", fov=(2 * math.pi, math.pi / 2), reach=(0.1, 6.0),
+    encoding="log", noise=ImageNoiseConfig(gaussian=0.003),
+)  # fmt: skip
+"""A ring of small range sensors that see all around and 45 degrees up and down, with an error of 2 cm."""
+SENSED = ("position_error", "attitude", "velocity", "body_rate", "past_actions")
+"""What a vehicle knows that is not told of the others."""
 
 
 @register("swap")
@@ -30,6 +40,7 @@ class SwapConfig(TaskConfig):
     route: ClassVar[str] = "e2efly.tasks.swap.goal:SwapRoute"
     best: ClassVar = "bptt"
     shows_error: ClassVar = True
+    variants: ClassVar = ("depth",)
 
     agents: int = number(8, low=2, high=64, sets_shapes=True)
     """Number of vehicles in a world (sets shapes)."""
@@ -97,8 +108,8 @@ class SwapConfig(TaskConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """The way to the goal, and a distance to the others. Rewards as those of hovering and avoiding."""
-        network = NetworkConfig((128, 64))
+        """The way to the goal, and a distance to the others. Many small steps of learning."""
+        network = NetworkConfig((256, 128))
         if algo == "ppo":
             weights = {
                 "near": 1.0, "prog1": 1.0, "avoid": 0.3, "v1": 0.02, "anglev_sq": 0.002, "act2_sq": 0.02, "crash": 10.0,
@@ -108,13 +119,16 @@ class SwapConfig(TaskConfig):
                 steps=20_000_000,
             )  # fmt: skip
         weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 10.0}
-        if algo == "dagger":
-            return TrainConfig(
-                cls.training(), DAggerConfig(teacher="expert"), RewardConfig(weights, {"avoid_reach": 0.8}),
-                network=NetworkConfig((192, 128)), steps=12_000_000, chunk=600, eval_episodes=800,
-            )  # fmt: skip
         return TrainConfig(
-            cls.training(), BPTTConfig(envs=256, horizon=96, average=0.99),
-            RewardConfig(weights, {"avoid_reach": 0.8}),
-            network=network, steps=16_000_000, chunk=30, eval_episodes=800,
+            cls.training(), BPTTConfig(envs=64, horizon=32, learning_rate=2e-3, average=0.99),
+            RewardConfig(weights, {"avoid_reach": 0.8}), network=network, steps=24_000_000, chunk=400, eval_episodes=800,
+        )  # fmt: skip
+
+    @classmethod
+    def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
+        """`depth`: the others are not told. A ring of range sensors sees them."""
+        task = dataclasses.replace(cls.training(), observes=SENSED)
+        return dataclasses.replace(
+            config, task=task, env=EnvConfig(cameras=(RING,)),
+            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), fast_compile=False,
         )  # fmt: skip

@@ -12,7 +12,7 @@ from e2efly.control.place import Place
 from e2efly.control.vectors import Array, Vec3, namespace
 from e2efly.courses import defaults
 from e2efly.policy.goal import Course, Goal, Observed, Outcome, Shape
-from e2efly.policy.observation import Company, Field
+from e2efly.policy.observation import OTHERS, Company, Field
 from e2efly.policy.others import Others, company_of, nobody, others_fields
 from e2efly.tasks.route import Route, place
 from e2efly.tasks.swap import SwapConfig
@@ -47,9 +47,13 @@ class SwapGoal(Goal):
         return self.config.neighbours
 
     @property
-    def company(self) -> Company:
-        """The others may be as far away as two places, and fly at more than twice the speed of the reward."""
+    def company(self) -> Company | None:
+        """The others may be as far away as two places, and fly at more than twice the speed of the reward. None: by
+        cameras alone.
+        """
         c = self.config
+        if not c.shows(OTHERS):
+            return None
         return company_of(self.neighbours, math.hypot(c.side, c.side, 2 * c.height), 2.5 * float(c.speed))
 
     def among(self, memory: SwapMemory, others: Others) -> SwapMemory:
@@ -69,7 +73,7 @@ class SwapGoal(Goal):
         return memory.others.motion(body)
 
     @property
-    def shown(self) -> tuple[Observed, ...]:
+    def observable(self) -> tuple[Observed, ...]:
         """The place, and the nearest others."""
         where, motion = others_fields(self.config.neighbours)
         place = Field("position_error", 3, "world", "m", 1.0, "target position minus vehicle position")
