@@ -51,13 +51,6 @@ def test_it_learns_what_the_teacher_does_without_being_told_the_same() -> None:
     assert success[-20:].max() > 0.9, "it flies by what it has learned"
 
 
-@pytest.mark.parametrize("weight", [1.0, 0.0])
-def test_what_the_teacher_sees_is_read_from_the_memory_if_that_is_asked_for(weight: float) -> None:
-    made = setup(led=1.0, env={"past_actions": 4}, recurrent=64, reconstruction=weight)
-    error = learned(made, 150)["loss/reconstruction"]
-    assert (error[-20:].mean() < 0.5 * error[:5].mean()) == (weight > 0)
-
-
 def test_a_teacher_flies_as_its_file_does() -> None:
     env = setup("race_eyes").env
     guide, policy = teacher_of("race_any"), load_policy("race_any")

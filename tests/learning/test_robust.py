@@ -28,7 +28,7 @@ def test_the_tasks_that_have_it_change_the_vehicle_and_remember() -> None:
     )
     assert names.split() == ROBUST
     for task in ROBUST:
-        nominal, robust = (e2efly.preset(task, "bptt", name) for name in ("nominal", "robust"))
+        nominal, robust = (e2efly.preset(task, TASKS[task].best, name) for name in ("nominal", "robust"))
         assert robust.network.recurrent > 0
         assert bool(nominal.network.recurrent) == bool(TASKS[task].cameras and task != "land_visual")
         drawn = presets.OTHERS
@@ -49,7 +49,7 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     said = " ".join(capsys.readouterr().err.split())
     assert (
         "preset 'robust': accepted for avoid by bptt, avoid_together by bptt, dodge by bptt, gap by bptt, "
-        "hall by bptt, hover by bptt or ppo, hover_aware by bptt, land by bptt, "
+        "hall by dagger, hover by bptt or ppo, hover_aware by bptt, land by bptt, "
         "land_visual by bptt, race by bptt, race_clutter by bptt, race_clutter_room by bptt, "
         "race_speed by bptt, track by bptt or ppo" in said
     )
@@ -65,8 +65,8 @@ def test_robust_is_what_a_task_is_learned_by_where_it_can_be(tmp_path: Path) -> 
         assert e2efly.preset(task, algo) == config
         assert parse([task, "--algo", algo]).config == config
     assert parse(["hover"]).config == e2efly.preset("hover") == e2efly.preset("hover", "bptt", "robust")
-    for algo in ("ppo", "bptt"):  # of several, the last counts, also for what the preset depends on
-        assert parse(["hover", "--algo", "shac", f"--algo={algo}"]).config == e2efly.preset("hover", algo)
+    with pytest.raises(ValueError, match="--algo is given twice"):
+        parse(["hover", "--algo", "shac", "--algo=ppo"])
 
 
 def test_who_starts_from_a_policy_learns_gently_whatever_flies() -> None:

@@ -94,7 +94,7 @@ def test_the_expert_flies_beside_what_stands_ahead() -> None:
 
 
 def test_the_policy_is_told_the_way_and_shown_the_rays() -> None:
-    config = presets.preset("hall", "bptt", "robust")
+    config = presets.preset("hall", "dagger", "robust")
     env = Env.of(config.task, config.reward, config.env)
     assert [field.name for field in env.task.fields] == ["desired_velocity", "height"]
     state, _ = jax.jit(Env.reset, static_argnums=2)(env, random_key(0), 8)

@@ -293,8 +293,5 @@ class DAggerConfig(_Annealed):
     the task, if it has one. If it is empty, the zoo's policy of the task (sets the program)."""
     led: float = number(0.15, high=1.0)
     """Share of the run in which the teacher flies, too: in all windows at its start, in none from then on."""
-    reconstruction: float = number(0.0, added=True)
-    """Weight of the error with which a linear layer reads what the teacher sees from the memory of the policy. Without
-    a memory, and with an expert, there is nothing to read."""
     learning_rate: float = number(2e-3, above=0, high=1.0)
     """Learning rate of Adam at the start."""

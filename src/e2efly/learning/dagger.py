@@ -3,9 +3,7 @@
 The policy that learns flies, and at each state that it meets, the teacher says what it would do there. The error of the
 action is minimised over windows of steps, through the recurrent network but not through physics: what the teacher does
 already looks ahead. At the start of a run the teacher flies in a share of the windows, so that the policy sees where a
-good flight leads. With `reconstruction`, a linear layer reads what the teacher sees from the memory of the policy: its
-error, too, is minimised, so that the memory learns where the vehicle is from more than four numbers. The layer is not
-part of the policy's file.
+good flight leads.
 """
 
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ from jaxtyping import Array, Float
 from e2efly.config import DAggerConfig
 from e2efly.environment import Env, EnvState
 from e2efly.learning.algorithm import Algorithm, TrainState, annealed, descend
-from e2efly.learning.networks import Weights, init_mlp
+from e2efly.learning.networks import Weights
 from e2efly.learning.rollout import RolloutState, StepRecord, advance
 from e2efly.learning.teacher import Expert, Teacher, teacher_of
 
@@ -30,8 +28,6 @@ class DAggerParameters:
     """What DAgger learns."""
 
     policy: Weights
-    reading: tuple[Array | np.ndarray, Array | np.ndarray]
-    """Weights (k, f) and biases (f,) of the layer that reads the features of the teacher from the memory."""
 
 
 class DAgger(Algorithm):
@@ -43,10 +39,8 @@ class DAgger(Algorithm):
         Raises:
             ValueError: for a teacher that does not fly in this environment.
         """
-        guide, rng = teacher(env, config), np.random.default_rng(seed)
-        guide.check(env)
-        policy = self.actor.init(rng, np.asarray(env.hover))
-        return DAggerParameters(policy, init_mlp(rng, (self.actor.network.recurrent, guide.size), 0.1)[0])
+        teacher(env, config).check(env)
+        return DAggerParameters(self.actor.init(np.random.default_rng(seed), np.asarray(env.hover)))
 
     def replay(self, env: Env, config: DAggerConfig, state: EnvState, observation: Float[Array, "n o"]) -> Array:
         """The teacher's memory."""
@@ -62,32 +56,24 @@ class DAgger(Algorithm):
         leads = jax.random.uniform(drawn, (state.observation.shape[0], 1)) < led
 
         def loss(parameters: DAggerParameters) -> tuple[Array, Any]:
-            weight, bias = parameters.reading
-
             def step(carry: tuple[RolloutState, Array], _: None) -> tuple[Any, Any]:
                 at, remembered = carry
                 features = self.actor.features(at.observation, at.env.images)
                 action, memory = self.actor(parameters.policy, features, at.memory)
                 wanted, remembered = guide.act(env, at.env, remembered)
-                unread = memory @ weight + bias - guide.sees(env, at.env)
                 flown = jax.lax.stop_gradient(jnp.where(leads, wanted, action))
                 after, out = advance(env, config, at, flown, memory, critic=False)
                 remembered = jnp.where(out.done[:, None], 0.0, remembered)
-                errors = {
-                    "imitation": jnp.mean((action - wanted) ** 2),
-                    "reconstruction": jnp.sum(unread**2) / max(unread.size, 1),
-                }
-                return (after, remembered), (errors, StepRecord.of(out))
+                return (after, remembered), (jnp.mean((action - wanted) ** 2), StepRecord.of(out))
 
             first = RolloutState.of(state), state.replay
             end, (errors, record) = jax.lax.scan(step, first, None, length=config.horizon)
-            errors = jax.tree.map(jnp.mean, errors)
-            error = errors["imitation"] + config.reconstruction * errors["reconstruction"]
-            return error, (end, errors, record.metrics())
+            error = jnp.mean(errors)
+            return error, (end, error, record.metrics())
 
-        gradient, ((end, remembered), errors, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
+        gradient, ((end, remembered), error, metrics) = jax.grad(loss, has_aux=True)(state.parameters)
         parameters, optimizer, norm = descend(config, rate, state.parameters, state.optimizer, gradient)
-        metrics |= {f"loss/{name}": error for name, error in errors.items()} | {"loss/gradient_norm": norm}
+        metrics |= {"loss/imitation": error, "loss/gradient_norm": norm}
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key, replay=remembered), metrics
 
 

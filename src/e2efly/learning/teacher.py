@@ -35,17 +35,8 @@ class Teacher:
         self, env: Env, state: EnvState, memory: Float[Array, "n m"]
     ) -> tuple[Float[Array, "n c"], Float[Array, "n m"]]:
         """Its actions and its next memories. It is shown the true motion, without age and errors."""
-        action, memory = self.actor(self.weights, self.sees(env, state), memory)
-        return jax.lax.stop_gradient((action, memory))
-
-    @property
-    def size(self) -> int:
-        """Number of features that it sees."""
-        return self.actor.features.size
-
-    def sees(self, env: Env, state: EnvState) -> Float[Array, "n f"]:
-        """The features of the true motion, and of what else it is told."""
-        return jax.lax.stop_gradient(self.actor.features(self._told(env).shown(state, state.vehicle)))
+        features = self.actor.features(self._told(env).shown(state, state.vehicle))
+        return jax.lax.stop_gradient(self.actor(self.weights, features, memory))
 
     def _told(self, env: Env) -> Env:
         told = env.showing([field.name for field in self.contract.observation])
@@ -82,12 +73,6 @@ class Teacher:
 @dataclass(frozen=True)
 class Expert:
     """The expert of a task (`e2efly.tasks.task.Guided`) as a teacher."""
-
-    size = 0
-
-    def sees(self, env: Env, state: EnvState) -> Float[Array, "n 0"]:
-        """It has no features."""
-        return jnp.zeros((len(state.time), 0))
 
     def memory(self, n: int) -> Float[Array, "n 0"]:
         """It remembers nothing."""

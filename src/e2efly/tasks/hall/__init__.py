@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import (
+    AlgorithmConfig,
     BPTTConfig,
     CameraConfig,
+    DAggerConfig,
     EnvConfig,
     ForestConfig,
     ImageNoiseConfig,
@@ -19,6 +21,7 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.config.algorithms import EXPERT
 from e2efly.config.numbers import SPEED
 from e2efly.tasks.avoid import AvoidConfig
 from e2efly.tasks.registry import register
@@ -38,7 +41,8 @@ class HallConfig(AvoidConfig):
     world: ClassVar[str] = "e2efly.tasks.hall.world:Hall"
     goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
     route: ClassVar[str] = "e2efly.tasks.hall.goal:HallRoute"
-    robust: ClassVar = {"bptt": Robust(steps=2_000_000, chunk=60, recurrent=64, hidden=(128, 64))}
+    best: ClassVar = "dagger"
+    robust: ClassVar = {"dagger": Robust(steps=8_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
     cameras: ClassVar = (LIDAR,)
     curriculum: ClassVar = ()
     paper: ClassVar = None
@@ -62,14 +66,16 @@ class HallConfig(AvoidConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """As for the forest: imitate an expert that knows the hall, and keep away from what stands in it."""
+        """Imitate an expert that knows the hall. By a gradient, keep away from what stands in it, too."""
         config = super().recipe(algo)
         weights, network = config.reward.weights, NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
-        settings = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
-        if algo == "ppo":
+        settings: AlgorithmConfig = DAggerConfig(teacher=EXPERT)
+        if algo == "bptt":
+            settings = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
+        elif algo == "ppo":
             network, settings = dataclasses.replace(network, recurrent=0), PPOConfig(learning_rate=2e-3, gamma=0.98)
         return dataclasses.replace(
             config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network,
             reward=RewardConfig(dict(weights), config.reward.parameters), env=EnvConfig(cameras=cls.cameras),
-            curriculum=(), steps=2_000_000, chunk=60,
+            curriculum=(), steps=5_000_000 if algo == "dagger" else 2_000_000, chunk=200 if algo == "dagger" else 60,
         )  # fmt: skip

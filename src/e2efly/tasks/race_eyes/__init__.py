@@ -115,7 +115,7 @@ class RaceEyesConfig(TaskConfig):
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
         """The zoo's policy of the preset `told` is imitated. The other algorithms have rewards."""
-        settings: AlgorithmConfig = DAggerConfig(teacher="race_told", reconstruction=0.2)
+        settings: AlgorithmConfig = DAggerConfig(teacher="race_told")
         weights = {"progway": 2.0, "fitlog": 40.0, "overspeed": 0.03, "anglev_sq": 0.0005, "act2_sq": 0.005}
         if algo == "bptt":
             settings = BPTTConfig(

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from e2efly.config import (
+    AlgorithmConfig,
     BPTTConfig,
     CameraConfig,
+    DAggerConfig,
     EnvConfig,
     ImageNoiseConfig,
     NetworkConfig,
@@ -17,6 +19,7 @@ from e2efly.config import (
     TrainConfig,
     number,
 )
+from e2efly.config.algorithms import EXPERT
 from e2efly.config.domain import Domain, extent
 from e2efly.config.numbers import SPEED
 from e2efly.tasks.registry import register
@@ -118,17 +121,29 @@ class SwapConfig(TaskConfig):
                 cls.training(), PPOConfig(), RewardConfig(weights, {"avoid_reach": 0.6}), network=network,
                 steps=20_000_000,
             )  # fmt: skip
+        settings: AlgorithmConfig = BPTTConfig(envs=64, horizon=32, learning_rate=2e-3, average=0.99)
+        if algo == "dagger":
+            settings = DAggerConfig(teacher=EXPERT)
         weights = {"prog2": 1.0, "v1": 0.1, "anglev_sq": 0.02, "act2_sq": 0.02, "overspeed": 1.0, "avoid": 10.0}
         return TrainConfig(
-            cls.training(), BPTTConfig(envs=64, horizon=32, learning_rate=2e-3, average=0.99),
-            RewardConfig(weights, {"avoid_reach": 0.8}), network=network, steps=24_000_000, chunk=400, eval_episodes=800,
+            cls.training(), settings, RewardConfig(weights, {"avoid_reach": 0.8}), network=network,
+            steps=24_000_000, chunk=400, eval_episodes=800,
         )  # fmt: skip
 
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
-        """`depth`: the others are not told. A ring of range sensors sees them."""
-        task = dataclasses.replace(cls.training(), observes=SENSED)
+        """`depth`: the others are not told. A ring of range sensors sees them. An expert that is told of them is
+        imitated (dagger); with that policy to start from, gradients then keep vehicles apart (bptt).
+        """
+        config = dataclasses.replace(
+            config, task=dataclasses.replace(cls.training(), observes=SENSED), env=EnvConfig(cameras=(RING,)),
+            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), steps=12_000_000, chunk=200,
+            eval_episodes=400, fast_compile=False,
+        )  # fmt: skip
+        if not isinstance(config.algo, BPTTConfig):
+            return config
+        weights = {**config.reward.weights, "avoid": 30.0}
         return dataclasses.replace(
-            config, task=task, env=EnvConfig(cameras=(RING,)),
-            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), fast_compile=False,
+            config, algo=BPTTConfig(envs=64, horizon=96, learning_rate_end=5e-5, average=0.99),
+            reward=RewardConfig(weights, {"avoid_reach": 0.5}), steps=1_000_000, chunk=30,
         )  # fmt: skip
