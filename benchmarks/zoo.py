@@ -70,7 +70,7 @@ VARIANTS = {
 """Policies of a task by a preset of its own: task, preset and algorithm."""
 ALONE = {
     "race_any": USUAL, "race_clutter_room": USUAL, "dodge": USUAL, "hall": USUAL, "hover_payload": USUAL,
-    "race_duel": USUAL, "race_told": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
+    "race_duel": USUAL, "swap": USUAL, "race_told": USUAL, "race_eyes": USUAL, "hover_rotors": presets.FAMILY,
 }  # fmt: skip
 """For this vehicle alone."""
 FRAMES = "multirotor"

@@ -30,6 +30,7 @@ TASKS = {
     "race_any": "Fly a lap of any track: a different one in every episode ([any track](any-track.md)).",
     "race_speed": "Fly a lap through gates at a commanded speed, in a room or outdoors.",
     "race_duel": "Race another, and touch neither it nor a gate ([how](many-vehicles.md#a-race-against-others)).",
+    "swap": "Exchange places, eight in a world, and touch none ([how](many-vehicles.md)).",
     "race_eyes": "Fly a lap of one of four tracks by a camera and an IMU alone ([racing by eye](eyes.md)).",
     "race_told": "The teacher of `race_eyes`: fly a lap of the same tracks by poses, at about 9 m/s.",
     "gap": "Fly through a narrow tilted slit, banked.",

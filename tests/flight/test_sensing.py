@@ -152,6 +152,7 @@ class Trained:
     """A policy that never acts, of a training that covered this sensing."""
 
     name, images, decision, problem, state, lands, done, native_id = "policy", (), None, None, None, False, False, None
+    unplaced = False
 
     def __init__(self, sensing: Domain | None) -> None:
         self.sensing = sensing
@@ -188,6 +189,27 @@ def test_a_policy_is_not_begun_by_poses_with_holes_that_its_training_did_not_hav
     flight = world.bridge.flight
     assert flight.mode is (Mode.HOVER if refused else Mode.POLICY)
     assert any(why.startswith(f"{Reason.SENSING}: hold is 60 ms") for why in flight.reasons) is refused
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_policy_that_lives_by_the_controllers_attitude_is_not_begun_without_it(
+    told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = slow(None)
+    monkeypatch.setattr(world.bridge.worker, "unplaced", True, raising=False)
+    world.every = DT
+    world.fly(2.0)
+    world.armed = True
+    world.bridge.flight = replace(
+        Flight(Mode.HOVER, now=world.now, since=world.now), target=Target((0.0, 0.0, 1.0), 0.0)
+    )
+    world.fly(0.5)
+    if not told:
+        monkeypatch.setattr(world.bridge.autopilot, "attitude", lambda *_: None)
+    world.mission = Mission.POLICY
+    world.fly(0.05)
+    assert world.bridge.flight.mode is (Mode.POLICY if told else Mode.HOVER)
+    assert any("has told no attitude" in why for why in world.bridge.flight.reasons) is not told
 
 
 @pytest.mark.parametrize(("since", "judged"), [(0.0, True), (WATCHED_S, False)])

@@ -19,7 +19,7 @@ from e2efly.policy import worker as worker_module
 from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.onnx_file import sealed
-from e2efly.policy.runtime import Runtime
+from e2efly.policy.runtime import Imu, Runtime
 from e2efly.policy.worker import PolicyWorker, Sensed
 from e2efly.tasks.route import course_for
 from e2efly.vehicles.loading import load_vehicle
@@ -86,6 +86,18 @@ def test_it_decides_when_due_on_a_grid_without_drift(workers: Workers) -> None:
     late = np.array(decided) - period * np.arange(len(decided))
     assert late.min() >= -0.005 - 1e-9 and late.max() <= 0.01
     assert worker.state.slots - worker.state.steps == 0
+
+
+def test_a_policy_that_is_told_no_place_sees_the_controllers_own_attitude(workers: Workers) -> None:
+    assert not workers().unplaced
+    policy = load_policy("race_eyes")
+    blind = Runtime.of(policy, course_for(policy.contract, VEHICLE), VEHICLE, imu=True, images=True)
+    worker, tilted = workers(of=blind), np.array([0.8, 0.6, 0.0, 0.0])
+    images = [np.zeros(image.shape, np.float32) for image in worker.images]
+    assert worker.unplaced
+    assert worker.step(Sensed(STILL, Imu(ZERO, ZERO), images, None, tilted), START, 0.0), worker.problem
+    assert worker.decision is not None
+    np.testing.assert_allclose(worker.decision.observation[policy.contract.slices["attitude"]], tilted)
 
 
 def test_between_two_questions_the_last_decision_stands(workers: Workers) -> None:

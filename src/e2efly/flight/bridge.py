@@ -265,6 +265,8 @@ class Bridge:
         """Why a policy must not act on the newest images, or among the other vehicles. None: it may."""
         here, begins = None if self.odometry is None else self.odometry.position, self.flight.mode is not Mode.POLICY
         lost = None if self.neighbours is None else self.neighbours.problem(now, here, begins)
+        if self.worker is not None and self.worker.unplaced and self.autopilot.attitude(now, ATTITUDE_S) is None:
+            lost = f"the flight controller has told no attitude for {ATTITUDE_S:g} s"
         return next((problem for seen in self.seen if (problem := seen.problem(now))), lost)
 
     @property
@@ -350,7 +352,10 @@ class Bridge:
             images = [frame.image.astype(np.float32) for frame in frames]
             near, count = self.neighbours, worker.neighbours
             others = None if near is None or not count else near.nearest(odometry, now, count)
-            if worker.step(Sensed(odometry, self.imu, images, others), now, slack) and self.log is not None:
+            told = self.autopilot.attitude(now, ATTITUDE_S) if worker.unplaced else None
+            attitude = None if told is None else Quat.of_euler(told[0].roll, told[0].pitch, told[0].yaw).stack()
+            sensed = Sensed(odometry, self.imu, images, others, attitude)
+            if worker.step(sensed, now, slack) and self.log is not None:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
         self.inputs = dataclasses.replace(
             self.inputs, policy_problem=self.inputs.policy_problem or worker.problem, policy_done=worker.done,

@@ -109,6 +109,10 @@ OWN = (
 needs. A policy that was exported before an entry was added goes on without it, in the simulator and in flight."""
 
 
+INERTIAL = {ATTITUDE.name, GYROSCOPE.name, ACCELEROMETER.name, PAST_ACTIONS}
+"""Names of the fields that a flight controller alone tells, without a source of poses."""
+
+
 def own_fields(*, imu: bool, actions: int, size: int = 4) -> tuple[Own, ...]:
     """The rows of the table that there are with or without an IMU, and with a number of past actions of `size` numbers
     each.

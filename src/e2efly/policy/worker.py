@@ -1,5 +1,6 @@
 """Call the policy in its own thread, so that a slow or stuck policy never delays the control loop."""
 
+import dataclasses
 import os
 import threading
 import time
@@ -15,6 +16,7 @@ import numpy as np
 
 from e2efly.config.domain import Domain
 from e2efly.policy.images import Image
+from e2efly.policy.observation import INERTIAL
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.others import Others
 from e2efly.policy.runtime import Decision, Imu, Runtime, RuntimeState, act, begin, due, outside
@@ -33,6 +35,8 @@ class Sensed:
     """The newest image of each camera, in the order of `Worker.images`."""
     others: Others | None = None
     """The nearest other vehicles, `Worker.neighbours` at most."""
+    attitude: np.ndarray | None = None
+    """(4,) the flight controller's own attitude, unit quaternion wxyz, for a worker that is `unplaced`."""
 
 
 class Worker(Protocol):
@@ -77,6 +81,11 @@ class Worker(Protocol):
     @property
     def neighbours(self) -> int:
         """Number of the nearest other vehicles that it observes."""
+        ...
+
+    @property
+    def unplaced(self) -> bool:
+        """Whether of the motion it is shown only where up is: then by the flight controller's own attitude."""
         ...
 
     def hear(self, odometry: Odometry | None, now: float) -> None:
@@ -153,6 +162,11 @@ class PolicyWorker:
         return getattr(self.runtime.course.goal, "neighbours", 0)
 
     @property
+    def unplaced(self) -> bool:
+        """Whether its contract has nothing but the attitude, an IMU and past actions."""
+        return {field.name for field in self.runtime.policy.contract.observation} <= INERTIAL
+
+    @property
     def done(self) -> bool:
         """Whether its task is over."""
         return self.state is not None and self.state.done
@@ -213,8 +227,10 @@ class PolicyWorker:
             _try_out(self.runtime)
         while (question := self._questions.get()) is not None:
             future, state, s, now = question
+            seen = None if s.attitude is None else dataclasses.replace(s.odometry, quaternion=s.attitude)
             try:
-                future.set_result(act(self.runtime, state, s.odometry, now, s.imu, images=s.images, others=s.others))
+                decided = act(self.runtime, state, s.odometry, now, s.imu, seen=seen, images=s.images, others=s.others)
+                future.set_result(decided)
             except Exception as error:  # told to whoever waits for it
                 future.set_exception(error)
 

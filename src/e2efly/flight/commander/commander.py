@@ -83,6 +83,8 @@ class Commander:
     """It has no thread."""
     neighbours = 0
     """It is told of no other vehicles."""
+    unplaced = False
+    """It is told everything else."""
 
     def __init__(
         self,

@@ -15,7 +15,6 @@ from e2efly.config import (
     ImageNoiseConfig,
     NetworkConfig,
     PPOConfig,
-    RewardConfig,
     Robust,
     TaskConfig,
     TrainConfig,
@@ -68,14 +67,14 @@ class HallConfig(AvoidConfig):
     def recipe(cls, algo: str) -> TrainConfig:
         """Imitate an expert that knows the hall. By a gradient, keep away from what stands in it, too."""
         config = super().recipe(algo)
-        weights, network = config.reward.weights, NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
-        settings: AlgorithmConfig = DAggerConfig(teacher=EXPERT)
-        if algo == "bptt":
-            settings = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
+        network = NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
+        settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
+        if algo == "dagger":
+            network, settings = NetworkConfig((192, 96), pool=(4, 64), recurrent=128), DAggerConfig(teacher=EXPERT)
         elif algo == "ppo":
             network, settings = dataclasses.replace(network, recurrent=0), PPOConfig(learning_rate=2e-3, gamma=0.98)
+        steps, chunk = (8_000_000, 200) if algo == "dagger" else (2_000_000, 60)
         return dataclasses.replace(
             config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network,
-            reward=RewardConfig(dict(weights), config.reward.parameters), env=EnvConfig(cameras=cls.cameras),
-            curriculum=(), steps=5_000_000 if algo == "dagger" else 2_000_000, chunk=200 if algo == "dagger" else 60,
+            env=EnvConfig(cameras=cls.cameras), curriculum=(), steps=steps, chunk=chunk,
         )  # fmt: skip
