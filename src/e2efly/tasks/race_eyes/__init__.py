@@ -128,7 +128,7 @@ class RaceEyesConfig(TaskConfig):
             cls.training(), settings, RewardConfig(weights, {"fitlog_margin": 0.2, "desired_speed": 9.0}),
             ABOUT,
             NetworkConfig((96, 96), pool=(18, 32), encoder=(96,), recurrent=128),
-            steps=24_000_000, chunk=300, eval_episodes=250, fast_compile=False,
+            steps=25_000_000, chunk=300, eval_episodes=250, fast_compile=False,
         )  # fmt: skip
 
     @classmethod
