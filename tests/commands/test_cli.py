@@ -51,7 +51,6 @@ def error_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             ["train", "hover", "--reward.weights", "v1", "1", "--reward.weights", "near", "1"],
             "--reward.weights is given twice; accepted: once, with all of its values after it",
         ),
-        (["train", "hover", "--seed=1", "--seed", "2"], "--seed is given twice"),
         (["train", "hover", "--gpu"], "unknown option '--gpu'; did you mean --device gpu?"),
         (["train", "race", "--task.lap=2"], "unknown option '--task.lap=2'; did you mean --task.laps"),
         (["eval", "--episode", "5"], "unknown option '--episode'; did you mean --episodes or"),  # and no policy

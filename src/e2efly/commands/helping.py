@@ -59,7 +59,8 @@ def refuse_unknown(given: Sequence[str], command: str, actions: Sequence[argpars
 
 
 def refuse_repeated(flags: Sequence[str], actions: Sequence[argparse.Action]) -> None:
-    """Refuse an option that is given twice, of which only the last would count.
+    """Refuse an option of several values that is given twice: the values of the last one alone would count. Of an
+    option of one value, the last counts, as everywhere.
 
     Raises:
         ValueError: naming it.
@@ -68,7 +69,7 @@ def refuse_repeated(flags: Sequence[str], actions: Sequence[argparse.Action]) ->
     seen: set[str] = set()
     for flag in flags:
         action = known.get(flag)
-        if action is None or isinstance(action, argparse._AppendAction):
+        if action is None or action.nargs not in ("*", "+"):
             continue
         if action.dest in seen:
             raise ValueError(f"{flag} is given twice; accepted: once, with all of its values after it")
