@@ -70,10 +70,10 @@ class HallConfig(AvoidConfig):
         network = NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
         settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
         if algo == "dagger":
-            network, settings = NetworkConfig((192, 96), pool=(4, 64), recurrent=128), DAggerConfig(teacher=EXPERT)
+            settings = DAggerConfig(teacher=EXPERT)
         elif algo == "ppo":
             network, settings = dataclasses.replace(network, recurrent=0), PPOConfig(learning_rate=2e-3, gamma=0.98)
-        steps, chunk = (8_000_000, 200) if algo == "dagger" else (2_000_000, 60)
+        steps, chunk = (5_000_000, 200) if algo == "dagger" else (2_000_000, 60)
         return dataclasses.replace(
             config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network,
             env=EnvConfig(cameras=cls.cameras), curriculum=(), steps=steps, chunk=chunk,

@@ -137,7 +137,7 @@ class SwapConfig(TaskConfig):
         """
         config = dataclasses.replace(
             config, task=dataclasses.replace(cls.training(), observes=SENSED), env=EnvConfig(cameras=(RING,)),
-            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), steps=12_000_000, chunk=200,
+            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), steps=8_000_000, chunk=200,
             eval_episodes=400, fast_compile=False,
         )  # fmt: skip
         if not isinstance(config.algo, BPTTConfig):
