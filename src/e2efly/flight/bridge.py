@@ -262,7 +262,9 @@ class Bridge:
         )
 
     def _blindness(self, now: float) -> str | None:
-        """Why a policy must not act on the newest images, or among the other vehicles. None: it may."""
+        """Why a policy must not act on the newest images, among the other vehicles, or by the controller's attitude.
+        None: it may.
+        """
         here, begins = None if self.odometry is None else self.odometry.position, self.flight.mode is not Mode.POLICY
         lost = None if self.neighbours is None else self.neighbours.problem(now, here, begins)
         if self.worker is not None and self.worker.unplaced and self.autopilot.attitude(now, ATTITUDE_S) is None:

@@ -136,14 +136,14 @@ class SwapConfig(TaskConfig):
         imitated (dagger); with that policy to start from, gradients then keep vehicles apart (bptt).
         """
         config = dataclasses.replace(
-            config, task=dataclasses.replace(cls.training(), observes=SENSED), env=EnvConfig(cameras=(RING,)),
-            network=NetworkConfig((256, 128), pool=(16, 64), recurrent=96), steps=8_000_000, chunk=200,
+            config, task=dataclasses.replace(config.task, observes=SENSED), env=EnvConfig(cameras=(RING,)),
+            network=dataclasses.replace(config.network, pool=(16, 64), recurrent=96), steps=8_000_000, chunk=200,
             eval_episodes=400, fast_compile=False,
         )  # fmt: skip
         if not isinstance(config.algo, BPTTConfig):
             return config
         weights = {**config.reward.weights, "avoid": 30.0}
         return dataclasses.replace(
-            config, algo=BPTTConfig(envs=64, horizon=96, learning_rate_end=5e-5, average=0.99),
+            config, algo=dataclasses.replace(config.algo, horizon=96, learning_rate_end=5e-5),
             reward=RewardConfig(weights, {"avoid_reach": 0.5}), steps=1_000_000, chunk=30,
         )  # fmt: skip
