@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from e2efly.config import DAggerConfig
+from e2efly.config import BPTTConfig, DAggerConfig
 from e2efly.environment import random_key
 from e2efly.learning.algorithm import begin
 from e2efly.learning.devices import OWN, on_each, own, stacked
@@ -17,7 +17,7 @@ from e2efly.learning.teacher import teacher_of
 from e2efly.policy.loader import load_policy
 from e2efly.policy.zoo import policy_file
 from e2efly.runs.inputs import input_files
-from e2efly.runs.presets import begun, for_vehicle, preset
+from e2efly.runs.presets import begun, for_vehicle, gentle, preset
 from e2efly.simulation.physics import State
 
 
@@ -91,6 +91,53 @@ def test_an_expert_teaches_what_the_reward_imitates() -> None:
     state, _ = env.reset(random_key(5), 16)
     action, _ = teacher_of("expert").act(env, state, jnp.zeros((16, 0)))
     np.testing.assert_array_equal(action, env.expert_action(state))
+
+
+def imitating(imitated: float | None, horizon: int = 64, task: str = "swap", **algo: Any) -> Setup:
+    """BPTT that begins with imitation, of an expert whose vehicles come near to each other."""
+    config = preset(task, "bptt", "nominal")
+    options = {"envs": 64, "horizon": horizon, "imitated": imitated, "learning_rate": 1e-4, "learning_rate_end": 1e-4}
+    settings = dataclasses.replace(config.algo, **(options | algo))
+    return Setup.of(
+        dataclasses.replace(config, algo=settings, network=dataclasses.replace(config.network, hidden=(64,)))
+    )
+
+
+def test_a_training_by_gradients_may_begin_with_imitation() -> None:
+    found = learned(imitating(0.8, term_gradients=True, imitation_rate=4e-3), 250)
+    error, avoided = found["loss/imitation"], found["gradient/avoid"]
+    assert error[190:200].mean() < 0.4 * error[10:30].mean(), "it imitates"
+    assert (error[200:] == 0).all() and (avoided[:200] == 0).all(), "then the reward decides"
+    assert (avoided[200:] > 0).any() and np.isfinite(found["loss/gradient_norm"]).all()
+
+
+def test_imitation_is_that_of_dagger() -> None:
+    """An update is as many windows of dagger as fit into it, with a gradient step each."""
+    both = imitating(0.99, horizon=32, imitation_rate=1e-3, learning_rate=1e-3, average=None)
+    config = dataclasses.replace(
+        preset("swap", "dagger", "nominal"), network=both.config.network, reward=both.config.reward,
+        algo=DAggerConfig(teacher="expert", envs=64, learning_rate=1e-3, learning_rate_end=1e-3, led=0.15 * 0.99),
+    )  # fmt: skip
+    wanted, found = learned(Setup.of(config), 20), learned(both, 20)
+    for name in ("loss/imitation", "loss/gradient_norm", "reward"):
+        np.testing.assert_allclose(found[name][:6], wanted[name][:6], rtol=5e-3, err_msg=name)  # then rounding grows
+
+
+def test_what_cannot_be_imitated_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"algo.imitated is 0.5; accepted: for a task with an expert"):
+        imitating(0.5, task="hover").parameters()
+    with pytest.raises(ValueError, match=r"algo.horizon is 48; accepted with algo.imitated: a multiple of 32"):
+        imitating(0.5, horizon=48)
+    with pytest.raises(ValueError, match=r"algo.imitated is 1.5; accepted"):
+        imitating(1.5)
+
+
+def test_a_run_that_starts_from_a_policy_imitates_nobody() -> None:
+    config = preset("hall", "bptt", "robust")
+    first, again = config.algo, gentle(config)
+    assert isinstance(first, BPTTConfig) and isinstance(again.algo, BPTTConfig) and first.imitated is not None
+    assert again.algo.imitated is None and again.steps == round(config.steps * (1 - first.imitated))
+    assert again.algo.learning_rate == first.learning_rate_end
 
 
 def test_by_default_the_teacher_is_the_zoos_policy_of_the_task() -> None:

@@ -49,7 +49,7 @@ def test_others_are_refused_by_name(task: str, algo: str, capsys: pytest.Capture
     said = " ".join(capsys.readouterr().err.split())
     assert (
         "preset 'robust': accepted for avoid by bptt, avoid_together by bptt, dodge by bptt, gap by bptt, "
-        "hall by dagger, hover by bptt or ppo, hover_aware by bptt, land by bptt, "
+        "hall by bptt or dagger, hover by bptt or ppo, hover_aware by bptt, land by bptt, "
         "land_visual by bptt, race by bptt, race_clutter by bptt, race_clutter_room by bptt, "
         "race_speed by bptt, track by bptt or ppo" in said
     )

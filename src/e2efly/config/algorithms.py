@@ -152,6 +152,10 @@ class PPOConfig(_Proximal):
     """Discount per step."""
 
 
+IMITATION_WINDOW = 32
+"""Steps of a window of imitation, over which the gradient of a GRU is propagated back."""
+
+
 @register("bptt")
 @dataclass(frozen=True)
 class BPTTConfig(_FirstOrder):
@@ -164,9 +168,23 @@ class BPTTConfig(_FirstOrder):
     average: float | None = number(None, high=0.9999)
     """Largest weight of the old value in a running mean of the policy, per update. While there are few policies, their
     plain mean is used. The running mean is evaluated and exported. None: no mean (sets the program)."""
+    imitated: float | None = number(None, above=0, high=0.99, added=True)
+    """Share of the run, at its start, in which the policy imitates the task's expert (as `dagger` does) in place of
+    following the gradient of the reward. None: no part of it (sets the program)."""
+    imitation_rate: float = number(2e-3, above=0, high=1.0, added=True)
+    """Learning rate of Adam at the start of the imitation. At its end it is `learning_rate`."""
     league: int = number(0, high=64, added=True, sets_shapes=True)
     """Number of past selves that are kept as opponents, for tasks with several vehicles in a world: in every second
     world, one of them flies all vehicles but the first (sets shapes)."""
+
+    def check(self) -> None:
+        """See `AlgorithmConfig.check`."""
+        super().check()
+        if self.imitated is not None and self.horizon % IMITATION_WINDOW:
+            raise ValueError(
+                f"algo.horizon is {self.horizon}; accepted with algo.imitated: a multiple of {IMITATION_WINDOW}, the "
+                "steps of a window of imitation"
+            )
 
 
 @register("shac")
@@ -286,7 +304,7 @@ class DAggerConfig(_Annealed):
     program: ClassVar = "e2efly.learning.dagger:DAgger"
     like: ClassVar = "bptt"
 
-    horizon: int = number(32, above=0)
+    horizon: int = number(IMITATION_WINDOW, above=0)
     """Steps of a window, over which the gradient of a GRU is propagated back (sets shapes)."""
     teacher: str = ""
     """The policy that is imitated: a task of the zoo, a run, or a policy.onnx, without cameras. expert: the expert of

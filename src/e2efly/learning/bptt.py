@@ -3,8 +3,12 @@
 Each update simulates a window of steps with the deterministic policy and follows the exact gradient of its discounted
 reward. The next window continues from the state at the end of this one, without its gradient. A new start inside a
 window cuts the gradient by itself, because it does not depend on earlier steps.
+
+A run may begin with the imitation of the task's expert (`BPTTConfig.imitated`): where it takes memory and sight to see
+what the reward punishes, a gradient finds nothing from fresh weights, and much from those of an imitator.
 """
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +19,9 @@ import optax
 from jaxtyping import Array, Float
 
 from e2efly.config import BPTTConfig
+from e2efly.config.algorithms import IMITATION_WINDOW
 from e2efly.environment import Env
+from e2efly.learning import dagger
 from e2efly.learning.algorithm import (
     Algorithm,
     TrainState,
@@ -28,6 +34,10 @@ from e2efly.learning.algorithm import (
 from e2efly.learning.league import flown_by_opponents, founded, joined, opponent, seat
 from e2efly.learning.networks import Weights
 from e2efly.learning.rollout import RolloutState, StepRecord, advance
+from e2efly.learning.teacher import Expert
+
+LED = 0.15
+"""Share of the imitation in which the expert flies, too: see `DAggerConfig.led`."""
 
 
 @jax.tree_util.register_dataclass
@@ -54,6 +64,8 @@ class BPTT(Algorithm):
         """
         if config.league and env.agents == 1:
             raise ValueError(f"algo.league is {config.league}; accepted: 0, or a task with several vehicles in a world")
+        if config.imitated is not None:
+            Expert().check(env, "algo.imitated", config.imitated)
         policy = self.actor.init(np.random.default_rng(seed), np.asarray(env.hover))
         members = founded(policy, config.league) if config.league else None
         return BPTTParameters(policy, jax.tree.map(np.copy, policy), members)
@@ -65,7 +77,29 @@ class BPTT(Algorithm):
     def update(
         self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
     ) -> tuple[TrainState, dict[str, Array]]:
-        """One window and one gradient step."""
+        """One window and one gradient step, or as much flight in short windows of imitation."""
+        share = config.imitated
+        if share is None:
+            after, metrics = self._gained(env, config, state, progress)
+        else:
+            after, metrics = jax.lax.cond(
+                progress < share,
+                lambda state: self._imitated(env, config, state, progress / share),
+                lambda state: self._gained(env, config, state, (progress - share) / (1 - share)),
+                state,
+            )
+        parameters: BPTTParameters = after.parameters
+        policy = parameters.learner
+        if config.average is not None:
+            count = optax.tree_utils.tree_get(after.optimizer, "count").astype(jnp.float32)
+            kept = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
+            policy = jax.tree.map(lambda a, b: b + kept * (a - b), parameters.policy, parameters.learner)
+        return dataclasses.replace(after, parameters=dataclasses.replace(parameters, policy=policy)), metrics
+
+    def _gained(
+        self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """A step along the gradient of the reward. `progress` is that of this part of the run."""
         old, rate, key = state.parameters, annealed(config, progress), state.key
         rival = None
         if old.league is not None:
@@ -77,15 +111,36 @@ class BPTT(Algorithm):
 
         grads, (end, metrics), norms = gradient_per_term(gain, old.learner, config.term_gradients)
         learner, optimizer, norm = descend(config, rate, old.learner, state.optimizer, grads)
-        policy = learner
-        if config.average is not None:
-            count = optax.tree_utils.tree_get(optimizer, "count").astype(jnp.float32)
-            share = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
-            policy = jax.tree.map(lambda a, b: b + share * (a - b), old.policy, learner)
         metrics |= {"loss/gradient_norm": norm, **norms}
+        metrics |= {} if config.imitated is None else {"loss/imitation": jnp.float32(0.0)}
         members = None if old.league is None else joined(old.league, learner, seat(progress, config.league))
-        parameters = BPTTParameters(policy, learner, members)
+        parameters = BPTTParameters(old.policy, learner, members)
         return end.into(state, parameters=parameters, optimizer=optimizer, key=key), metrics
+
+    def _imitated(
+        self, env: Env, config: BPTTConfig, state: TrainState, progress: Float[Array, ""]
+    ) -> tuple[TrainState, dict[str, Array]]:
+        """Steps that imitate the expert, each after a window of its own. `progress` is that of this part."""
+        key, drawn = jax.random.split(state.key)
+        leads = dagger.leading(drawn, state.observation.shape[0], LED, progress)
+        rate = config.imitation_rate * (config.learning_rate / config.imitation_rate) ** progress
+        guide, old = Expert(), state.parameters
+
+        def step(carry: tuple[RolloutState, Any, Any], _: None) -> tuple[Any, dict[str, Array]]:
+            at, learner, optimizer = carry
+            remembered = guide.memory(at.observation.shape[0])
+            gradient, (at, remembered, metrics) = dagger.window(
+                env, config, self.actor, guide, learner, at, remembered, leads, IMITATION_WINDOW
+            )
+            learner, optimizer, norm = descend(config, rate, learner, optimizer, gradient)
+            return (at, learner, optimizer), {**metrics, "loss/gradient_norm": norm}
+
+        first = RolloutState.of(state), old.learner, state.optimizer
+        (end, learner, optimizer), metrics = jax.lax.scan(step, first, None, length=config.horizon // IMITATION_WINDOW)
+        told = {name: jnp.sum(x) if name == "episodes" else jnp.mean(x) for name, x in metrics.items()}
+        names = [name.removeprefix("reward/") for name in told if name.startswith("reward/")]
+        told |= {f"gradient/{name}": jnp.float32(0.0) for name in names if config.term_gradients}
+        return end.into(state, parameters=dataclasses.replace(old, learner=learner), optimizer=optimizer, key=key), told
 
     def _window(
         self, env: Env, config: BPTTConfig, learner: Weights, rival: Weights | None, state: TrainState,

@@ -84,16 +84,14 @@ class Expert:
         """Its actions."""
         return env.expert_action(state), memory
 
-    def check(self, env: Env) -> None:
-        """Refuse a task without an expert, and commands that it does not give.
+    def check(self, env: Env, option: str = "algo.teacher", value: object = EXPERT) -> None:
+        """Refuse a task without an expert, and commands that it does not give, for an option that asks for an expert.
 
         Raises:
             ValueError: naming the option, its value and what is accepted.
         """
         if not isinstance(env.task, Guided) or env.physics.command_mode != "ctbr":
-            raise ValueError(
-                f"algo.teacher is {EXPERT}; accepted: for a task with an expert and env.command_mode ctbr, or a policy"
-            )
+            raise ValueError(f"{option} is {value}; accepted: for a task with an expert and env.command_mode ctbr")
 
 
 @cache

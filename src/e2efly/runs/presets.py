@@ -302,12 +302,17 @@ def begun(config: TrainConfig) -> TrainConfig:
 def gentle(config: TrainConfig) -> TrainConfig:
     """A configuration for a run that starts from a policy's weights.
 
-    Its learning rate is that with which other runs end.
+    Its learning rate is that with which other runs end. It imitates nobody, and takes the other part of the steps.
     """
     if not hasattr(config.algo, "learning_rate_end"):
         return config
-    rate: Any = config.algo.learning_rate_end  # type: ignore[attr-defined]
-    return dataclasses.replace(config, algo=dataclasses.replace(config.algo, **{"learning_rate": rate}))
+    algo: Any = config.algo
+    rates = {"learning_rate": algo.learning_rate_end}
+    imitated: float | None = getattr(algo, "imitated", None)
+    if imitated is None:
+        return dataclasses.replace(config, algo=dataclasses.replace(algo, **rates))
+    algo = dataclasses.replace(algo, imitated=None, **rates)
+    return dataclasses.replace(config, algo=algo, steps=round(config.steps * (1 - imitated)))
 
 
 def check(config: TrainConfig) -> None:

@@ -15,6 +15,7 @@ from e2efly.config import (
     ImageNoiseConfig,
     NetworkConfig,
     PPOConfig,
+    RewardConfig,
     Robust,
     TaskConfig,
     TrainConfig,
@@ -40,8 +41,11 @@ class HallConfig(AvoidConfig):
     world: ClassVar[str] = "e2efly.tasks.hall.world:Hall"
     goal_class: ClassVar[str] = "e2efly.tasks.avoid.goal:AvoidGoal"
     route: ClassVar[str] = "e2efly.tasks.hall.goal:HallRoute"
-    best: ClassVar = "dagger"
-    robust: ClassVar = {"dagger": Robust(steps=8_000_000, chunk=200, recurrent=96, hidden=(128, 64))}
+    best: ClassVar = "bptt"
+    robust: ClassVar = {
+        "bptt": Robust(steps=10_000_000, chunk=60, recurrent=96, hidden=(128, 64)),
+        "dagger": Robust(steps=8_000_000, chunk=200, recurrent=96, hidden=(128, 64)),
+    }
     cameras: ClassVar = (LIDAR,)
     curriculum: ClassVar = ()
     paper: ClassVar = None
@@ -65,16 +69,21 @@ class HallConfig(AvoidConfig):
 
     @classmethod
     def recipe(cls, algo: str) -> TrainConfig:
-        """Imitate an expert that knows the hall. By a gradient, keep away from what stands in it, too."""
+        """Imitate an expert that knows the hall. By a gradient, then keep away from what stands in it, too."""
         config = super().recipe(algo)
-        network = NetworkConfig((128, 64), pool=(4, 64), recurrent=64)
-        settings: AlgorithmConfig = BPTTConfig(horizon=48, learning_rate_end=3e-4, gradient_decay=1.5, average=0.99)
-        if algo == "dagger":
-            settings = DAggerConfig(teacher=EXPERT)
+        network, reward = NetworkConfig((128, 64), pool=(4, 64), recurrent=64), config.reward
+        settings: AlgorithmConfig = BPTTConfig(
+            horizon=96, learning_rate=1e-4, learning_rate_end=3e-5, gradient_decay=1.5, average=0.99, imitated=0.85
+        )
+        steps, chunk = 7_000_000, 60
+        if algo == "bptt":
+            reward = RewardConfig({"imitate": 1.0, "avoid": 20.0}, {"avoid_reach": 0.4})
+        elif algo == "dagger":
+            settings, steps, chunk = DAggerConfig(teacher=EXPERT), 5_000_000, 200
         elif algo == "ppo":
             network, settings = dataclasses.replace(network, recurrent=0), PPOConfig(learning_rate=2e-3, gamma=0.98)
-        steps, chunk = (5_000_000, 200) if algo == "dagger" else (2_000_000, 60)
+            steps = 2_000_000
         return dataclasses.replace(
-            config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network,
+            config, task=cls() if algo == "ppo" else cls.training(), algo=settings, network=network, reward=reward,
             env=EnvConfig(cameras=cls.cameras), curriculum=(), steps=steps, chunk=chunk,
         )  # fmt: skip

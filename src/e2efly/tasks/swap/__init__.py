@@ -133,7 +133,7 @@ class SwapConfig(TaskConfig):
     @classmethod
     def variant(cls, preset: str, config: TrainConfig) -> TrainConfig:
         """`depth`: the others are not told. A ring of range sensors sees them. An expert that is told of them is
-        imitated (dagger); with that policy to start from, gradients then keep vehicles apart (bptt).
+        imitated; by bptt, gradients then keep vehicles apart.
         """
         config = dataclasses.replace(
             config, task=dataclasses.replace(config.task, observes=SENSED), env=EnvConfig(cameras=(RING,)),
@@ -142,8 +142,8 @@ class SwapConfig(TaskConfig):
         )  # fmt: skip
         if not isinstance(config.algo, BPTTConfig):
             return config
+        algo = dataclasses.replace(config.algo, horizon=96, learning_rate=1e-4, learning_rate_end=3e-5, imitated=0.87)
         weights = {**config.reward.weights, "avoid": 30.0}
         return dataclasses.replace(
-            config, algo=dataclasses.replace(config.algo, horizon=96, learning_rate_end=5e-5),
-            reward=RewardConfig(weights, {"avoid_reach": 0.5}), steps=1_000_000, chunk=30,
-        )  # fmt: skip
+            config, algo=algo, reward=RewardConfig(weights, {"avoid_reach": 0.5}), steps=9_500_000, chunk=60
+        )
