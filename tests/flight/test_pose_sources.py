@@ -394,7 +394,7 @@ def test_a_plant_is_read_and_its_exceptions_do_not_escape() -> None:
 @pytest.mark.parametrize(
     ("text", "accepted"),
     [
-        ("", "mocap:.*; ros1:/topic; ros2:/topic; gates:.*; tcp:HOST:PORT; udp:PORT .*; or path/to/file.py:Name"),
+        ("", "imu; mocap:.*; ros1:/topic; ros2:/topic; gates:.*; tcp:HOST:PORT; udp:PORT .*; or path/to/file.py:Name"),
         ("serial:9870", "mocap:.*udp:PORT"),
         ("udp:", "udp:PORT or udp:HOST:PORT"),
         ("udp:0", "udp:PORT"),
@@ -406,7 +406,7 @@ def test_a_plant_is_read_and_its_exceptions_do_not_escape() -> None:
     ],
 )
 def test_a_source_that_makes_no_sense_is_refused(text: str, accepted: str) -> None:
-    with pytest.raises(ValueError, match=f"pose source is {text!r}; accepted: {accepted}"):
+    with pytest.raises(ValueError, match=f"pose source is {text!r}; accepted: .*{accepted}"):
         open_source(text)
 
 

@@ -13,12 +13,14 @@ from rich.console import Console
 from e2efly.commands import fly_check
 from e2efly.config.domain import Domain, Extent
 from e2efly.flight.betaflight.controller import identify
+from e2efly.flight.bridge import Bridge
 from e2efly.flight.pilot import estimate
 from e2efly.flight.pilot.delay_watch import DelayWatch, felt
 from e2efly.flight.pilot.estimate import StateEstimate
 from e2efly.flight.pilot.flight_state import Flight, Mission, Mode, Pilot, Reason, Target
 from e2efly.flight.pilot.sensing import BORNE, REMEDIES, WATCHED_S, sensed, sensing_problem
 from e2efly.flight.pose.conditions import Checks
+from e2efly.flight.pose.sources.imu_alone import ImuSource
 from e2efly.policy.contract import SENSING
 from e2efly.policy.odometry import Sample
 from tests.flight.test_bridge_silence import DT, World
@@ -210,6 +212,21 @@ def test_a_policy_that_lives_by_the_controllers_attitude_is_not_begun_without_it
     world.fly(0.05)
     assert world.bridge.flight.mode is (Mode.POLICY if told else Mode.HOVER)
     assert any("has told no attitude" in why for why in world.bridge.flight.reasons) is not told
+
+
+def test_poses_that_drift_are_for_a_policy_that_is_told_no_place() -> None:
+    world = slow(None)
+    old = world.bridge
+
+    def bridge(worker: Any) -> Bridge:
+        return Bridge(old.autopilot, ImuSource(), old.vehicle, old.settings, worker=worker)
+
+    for worker in (None, Trained(None)):
+        with pytest.raises(ValueError, match=r"the pose source is imu, .* told neither place nor velocity"):
+            bridge(worker)
+    unplaced = Trained(None)
+    unplaced.unplaced = True
+    assert bridge(unplaced).placeless and not old.placeless
 
 
 @pytest.mark.parametrize(("since", "judged"), [(0.0, True), (WATCHED_S, False)])

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from e2efly.flight.pilot.fence import RIGHTING, fence_problem, moved, stopping
-from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
+from e2efly.flight.pilot.flight_state import AIRBORNE, DRIFTED, Flight, Inputs, Mission, Mode, Pilot, Reason, Target
 from e2efly.flight.pilot.hover import blind_time
 from e2efly.flight.pilot.landing import BEYOND_S, FAST, FOUND_S, SLOWED_S, has_stood
 from e2efly.flight.pilot.refusals import take_off_refusals
@@ -359,6 +359,49 @@ def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
     # the target stays within reach: an updraught ends, and it is no stone
     lifted = flown(later, having(odometry=at(4.0, velocity=(0, 0, 1.0))))
     assert lifted.target is not None and lifted.target.position[2] >= 3.3
+
+
+NOWHERE = having(AWAY, placeless=True)
+"""A policy that is told no place, by poses that drift."""
+
+
+def test_without_a_place_no_fence_ends_a_policy_and_its_end_is_a_short_hover() -> None:
+    far = at(-7.0, x=500.0, velocity=(9.0, 0, 0))
+    flight = reached(Mode.POLICY, hovering(), NOWHERE)
+    flight = reached(Mode.POLICY, flight, having(NOWHERE, odometry=far), 1.0)
+    ended = having(NOWHERE, odometry=far, pilot=HOVER)
+    flight = reached(Mode.HOVER, flight, ended)
+    assert flight.target is not None
+    x, y, z = flight.target.position
+    assert 505 < x < 512 and (y, z) == (0.0, -7.0), "it brakes where it is, wherever the fence is"
+    flight = flown(flight, ended, 4.9)
+    assert flight.mode is Mode.HOVER
+    flight = reached(Mode.LAND, flight, ended, 0.3)
+    assert flight.blind and flight.misled == DRIFTED and said(flight, Reason.NO_ODOMETRY)
+    still = having(ended, odometry=at(0.05))
+    flight = reached(Mode.LAND, flight, still, 2.0)
+    assert flight.blind, "no such pose is believed again in this landing"
+    flight = reached(Mode.DONE, flight, having(still, stands=True))
+    assert said(flight, Reason.TOUCHED)
+    flight = reached(Mode.INIT, flight, having(still, stands=True, armed=False), 0.1)
+    assert flight.misled is None
+
+
+def test_without_a_place_it_hovers_for_seconds_and_lands_blind_for_any_reason() -> None:
+    waits = having(UP, placeless=True)
+    flight = reached(Mode.HOVER, reached(Mode.POLICY, hovering(), NOWHERE), waits)
+    flight = reached(Mode.HOVER, flight, waits, 4.9)
+    assert reached(Mode.LAND, flight, waits, 0.3).blind
+    asked = reached(Mode.LAND, flight, having(waits, pilot=LAND))
+    assert asked.blind and said(asked, Reason.MISSION)
+
+
+def test_without_a_place_a_vehicle_that_is_handed_over_in_the_air_sinks_level() -> None:
+    flight = reached(Mode.PILOT, hovering(), having(UP, placeless=True, override=False))
+    flight = reached(Mode.LAND, flight, having(UP, placeless=True))
+    assert flight.blind and said(flight, Reason.OVERRIDE_ON)
+    grounded = reached(Mode.PILOT, hovering(), having(UP, placeless=True, override=False))
+    assert reached(Mode.INIT, grounded, having(UP, odometry=at(), placeless=True)).blind is False
 
 
 def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() -> None:

@@ -19,7 +19,7 @@ from e2efly.policy import worker as worker_module
 from e2efly.policy.loader import load_policy
 from e2efly.policy.odometry import Odometry
 from e2efly.policy.onnx_file import sealed
-from e2efly.policy.runtime import Imu, Runtime
+from e2efly.policy.runtime import Imu, Runtime, act, begin, outside
 from e2efly.policy.worker import PolicyWorker, Sensed
 from e2efly.tasks.route import course_for
 from e2efly.vehicles.loading import load_vehicle
@@ -98,6 +98,22 @@ def test_a_policy_that_is_told_no_place_sees_the_controllers_own_attitude(worker
     assert worker.step(Sensed(STILL, Imu(ZERO, ZERO), images, None, tilted), START, 0.0), worker.problem
     assert worker.decision is not None
     np.testing.assert_allclose(worker.decision.observation[policy.contract.slices["attitude"]], tilted)
+
+
+def test_where_nobody_knows_the_place_the_task_judges_nothing_and_ends_in_time() -> None:
+    policy = load_policy("race_eyes")
+    course = dataclasses.replace(course_for(policy.contract, VEHICLE), duration=0.5)
+    lost = dataclasses.replace(Runtime.of(policy, course, VEHICLE, imu=True, images=True), placed=False)
+    far = dataclasses.replace(STILL, position=np.array([900.0, 0.0, -50.0]))
+    assert outside(lost, far, START) == ()
+    assert outside(dataclasses.replace(lost, placed=True), far, START)
+    assert any("speed" in why for why in outside(lost, dataclasses.replace(far, velocity=np.full(3, 9.0)), START))
+    images, state = [np.zeros(image.shape, np.float32) for image in policy.contract.images], begin(lost, STILL, START)
+    for k in range(16):
+        assert not state.done and not state.failure
+        state, decision = act(lost, state, far, START + k * lost.period, Imu(ZERO, ZERO), images=images)
+        assert decision.position is None
+    assert state.done and state.outcome is None
 
 
 def test_between_two_questions_the_last_decision_stands(workers: Workers) -> None:

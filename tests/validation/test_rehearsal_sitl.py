@@ -1,16 +1,22 @@
 """A whole flight through the real firmware."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from e2efly.logs.flight_log import read_log
 from e2efly.logs.telemetry import Telemetry
 from e2efly.policy.loader import load_policy
+from e2efly.tasks.route import usual_route
 from e2efly.validation import firmware_program, rehearsal
+from e2efly.validation.candidate import candidate
 from e2efly.validation.gate_pose import GateCamera
 from e2efly.validation.rehearsal import rehearse
+from e2efly.validation.scenery import Scenery
 from e2efly.vehicles.loading import load_vehicle
 
 
@@ -48,6 +54,26 @@ def test_a_whole_race_is_flown_by_a_camera_and_the_firmwares_own_imu() -> None:
     flight = rehearse(firmware_program.chosen(), load_policy("race"), load_vehicle("vis_r"), seed=3, gates=GateCamera())
     assert flight.complete and flight.success, (flight.told, flight.reasons)
     assert flight.top_speed > 9.0
+
+
+@pytest.mark.whole
+def test_a_whole_race_is_flown_by_an_eye_and_an_imu_with_no_place_at_all() -> None:
+    """Nobody tells where the vehicle is: take-off, three laps, braking, and a landing that it feels."""
+    policy = load_policy("race_eyes")
+    asked = candidate("race_eyes", task={"track": ("circle_3d",), "laps": 3, "episode_s": 40.0})
+    env = asked.environment(*asked.task.criteria().values())
+    usual: Any = usual_route(policy.contract)
+    route = dataclasses.replace(usual, outside=True, **(usual.whole | {"track": "circle_3d", "laps": 3}))
+    flight = rehearse(
+        firmware_program.chosen(), policy, load_vehicle("vis_r"), seed=5_000_000, route=route, placed=False,
+        scenery=Scenery.draw(env, 5_000_000),
+    )  # fmt: skip
+    assert flight.modes == ("init", "takeoff", "hover", "policy", "hover", "land", "done", "init")
+    assert flight.complete and flight.success, (flight.told, flight.reasons)
+    flown = flight.flown
+    blind = [i for i in flown.where("land") if flown.position[i][2] > 0.1]
+    assert np.linalg.norm(flown.velocity[blind[-1]]) < 2.0, "it arrives slowly"
+    assert min(flown.tilt_cosine[i] for i in flown.where("land")) > 0.9, "and upright"
 
 
 @pytest.mark.whole

@@ -27,7 +27,7 @@ from e2efly.flight.pilot import throttle_map
 from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.hovering import DEFAULT, hover_controller
 from e2efly.flight.pose.neighbours import Neighbours
-from e2efly.flight.pose.pose_source import AidedSource
+from e2efly.flight.pose.pose_source import AidedSource, drifts
 from e2efly.flight.pose.sources import open_source
 from e2efly.flight.process import raise_at_interrupt
 from e2efly.flight.publish import Live, targets_of
@@ -50,7 +50,11 @@ from e2efly.vehicles.vehicle_rules import check_quadrotor
 
 SLOWEST = 0.5
 """Largest `--latency`, s: with more delay no gains hold a hover."""
-
+NOWHERE = (
+    "Nobody knows where the vehicle is: no fence holds it, the policy's flight ends by your mission switch, and the "
+    "hover and the landing after it drift. Have the override switch at hand."
+)
+"""What `--pose imu` cannot promise."""
 
 if TYPE_CHECKING:
     from e2efly.viewing.watch.beside import Shown
@@ -71,8 +75,9 @@ class Fly:
     radio://0/80/2M/E7E7E7E7E7 or crazyflie:udp:HOST:PORT: a Crazyflie (docs/crazyflie.md). Or your own autopilot,
     path/to/file.py:Name[:...]."""
     pose: str = "udp:9870"
-    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, or your own source,
-    path/to/file.py:Name[:...]."""
+    """Pose source: udp:PORT, tcp:HOST:PORT, mocap:TYPE:HOST:BODY, ros1:/topic, ros2:/topic, gates:EYE.toml@IMAGE, or
+    your own source, path/to/file.py:Name[:...]. imu: none, for a policy that is told neither place nor velocity
+    (docs/eyes.md)."""
     others: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Pose source of each other vehicle, for policies that observe others, such as those of `swap`. One that is not
     seen for a second ends the policy's flight."""
@@ -226,7 +231,6 @@ def _prepared(options: Fly, console: Terminal) -> _Prepared:
         if reasons := check(loaded.contract, body, fields_of(loaded.contract), imu=True, images=True):
             raise ValueError("\n".join(reasons))
         course = course_for(loaded.contract, body, goal)
-        check_course(settings.fence, course)
         said = (*loaded.contract.differences(body), f"The course needs {course.needs}.")
         for line in (*said, *goal_notes(loaded.contract, goal)):
             console.print(line, style="dim")
@@ -267,6 +271,13 @@ def run(options: Fly) -> int:
         stack.callback(live.close)
         source = open_source(options.pose)
         stack.callback(source.close)
+        runtime = plan.runtime
+        if runtime is not None and not excited:
+            if drifts(source):
+                console.print(NOWHERE, style="bold")
+            else:
+                check_course(settings.fence, runtime.course)
+            runtime = dataclasses.replace(runtime, placed=not drifts(source))
         others = [stack.enter_context(closing(open_source(uri))) for uri in options.others]
         needs = (contract.others if contract else None) or USUAL
         commands = None if options.commands is None else open_commands(options.commands)
@@ -279,7 +290,7 @@ def run(options: Fly) -> int:
         stack.callback(autopilot.close)
         rows = autopilot.check(body, settings, contract)
         print_settings(console, rows)
-        worker = _worker(plan.runtime, commands, body, options)
+        worker = _worker(runtime, commands, body, options)
         if worker is not None:
             stack.callback(worker.close)
         bridge = Bridge(

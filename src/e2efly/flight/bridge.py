@@ -36,7 +36,7 @@ from e2efly.flight.pilot.touch import LAGS
 from e2efly.flight.pose.conditions import Checks
 from e2efly.flight.pose.neighbours import Neighbours
 from e2efly.flight.pose.pace import pace_problem
-from e2efly.flight.pose.pose_source import AidedSource, PoseSource
+from e2efly.flight.pose.pose_source import AidedSource, PoseSource, drifts
 from e2efly.flight.settings import FlightSettings
 from e2efly.flight.sight import quality
 from e2efly.flight.sight.image_source import ImageSource
@@ -111,7 +111,8 @@ class Bridge:
             neighbours: the other vehicles. None: nothing is known of any.
 
         Raises:
-            ValueError: for a vehicle with tilted rotors.
+            ValueError: for a vehicle with tilted rotors; for a source whose poses drift, unless a policy flies that is
+                told neither place nor velocity, without a filter.
         """
         check_level(vehicle, "a flight")
         delay: float = vehicle.latency if latency is None else latency
@@ -146,7 +147,16 @@ class Bridge:
         self._ticks, self._last, self._heard_since, self._broken = 0, 0.0, 0.0, -math.inf
         self._held, self._looked = self.sent, 0.0
         self._unlike: str | None = None
+        self._levelled = -math.inf, -math.inf
+        """When the newest attitude was requested, and when it was true, s."""
         self._aided = source if isinstance(source, AidedSource) else None
+        self.placeless = drifts(source)
+        """Whether the poses drift: nobody knows where the vehicle is."""
+        if self.placeless and (worker is None or not worker.unplaced or filter is not None):
+            raise ValueError(
+                f"the pose source is {source.describe()}; accepted: for a policy that is told neither place nor "
+                "velocity, such as race_eyes, and without --guard filter"
+            )
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
@@ -249,6 +259,7 @@ class Bridge:
             settings_problems=(*self.settings_problems, *report.problems, *((slow,) if slow else ())),
             policy_problem=report.policy_problem or self._blindness(now) or self._unfiltered,
             filtered=self.keeper is not None,
+            placeless=self.placeless,
             attitude_error=told.attitude_error(report.attitude),
             heading_error=told.heading_error,
             missed_deadlines=len(self._overdue),
@@ -282,7 +293,7 @@ class Bridge:
         attitude = autopilot.attitude(now, ATTITUDE_S)
         if (reading := report.inertial) is not None:
             flying = self.flying and abs(self.height) > LIFTED and inputs.armed
-            seen = inputs.seen if flying and not flight.misled else None
+            seen = inputs.seen if flying and not flight.misled and not self.placeless else None
             asked = reading.asked
             known = now - self._broken > ANEW_S
             acts = known and autopilot.delivered(asked - ACTING_S, asked) and not report.failsafe
@@ -307,7 +318,14 @@ class Bridge:
             if (force := self.estimate.inertial.force) is not None:
                 self.imu = Imu(measured.gyro, force)
                 if self._aided is not None:
-                    self._aided.feel(halfway, measured.gyro, force, standing=measured.standing)
+                    # the throttle of an armed vehicle is closed, too, while this program has it on the ground
+                    held = flight.mode is Mode.INIT and inputs.override
+                    stands, own = measured.standing or held, None
+                    if attitude is not None:
+                        if attitude[1] != self._levelled[0]:
+                            self._levelled = attitude[1], (attitude[1] + now) / 2  # between the question and its answer
+                        own = self._levelled[1], _quaternion(attitude[0])
+                    self._aided.feel(halfway, measured.gyro, force, standing=stands, attitude=own)
                 if sent is not None and acts and flying and not flight.blind:
                     swing = self._history.swing(asked)
                     self.map = learn(self.map, sent, force, inputs.voltage, 0.02, swing)
@@ -355,7 +373,7 @@ class Bridge:
             near, count = self.neighbours, worker.neighbours
             others = None if near is None or not count else near.nearest(odometry, now, count)
             told = self.autopilot.attitude(now, ATTITUDE_S) if worker.unplaced else None
-            attitude = None if told is None else Quat.of_euler(told[0].roll, told[0].pitch, told[0].yaw).stack()
+            attitude = None if told is None else _quaternion(told[0])
             sensed = Sensed(odometry, self.imu, images, others, attitude)
             if worker.step(sensed, now, slack) and self.log is not None:
                 record_policy(self.log, now, worker, [now - frame.time for frame in frames])
@@ -463,3 +481,7 @@ class Bridge:
             record_map(log, now, self.map)
         if self._ticks % 50 == 0:
             log.record("link", now, self.autopilot.link_record())
+
+
+def _quaternion(attitude: Attitude) -> np.ndarray:
+    return np.asarray(Quat.of_euler(attitude.roll, attitude.pitch, attitude.yaw).stack())

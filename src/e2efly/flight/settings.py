@@ -1,7 +1,7 @@
 """Limits of a flight: heights, speeds, time-outs, fence, and the pilot's channels. Checked before the first flight."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from e2efly.config.numbers import ANGLE, SPEED, check_fields, number
 
@@ -31,6 +31,11 @@ class Fence:
     scene: str | None = None
     """A scene file (.toml, see docs/vision.md) in the frame of the poses. The filter also keeps the vehicle out of its
     solids. None: no scene."""
+
+    @property
+    def opened(self) -> "Fence":
+        """This fence without its sides."""
+        return replace(self, low=(-math.inf,) * 3, high=(math.inf,) * 3)
 
 
 @dataclass(frozen=True)

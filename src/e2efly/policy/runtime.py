@@ -82,6 +82,9 @@ class Runtime:
     envelope: Envelope
     period: float
     """Time between two calls of the policy, s."""
+    placed: bool = True
+    """Whether the motion that `act` is given tells where the vehicle is. If not, the task judges nothing, and is over
+    when its time is over."""
 
     @staticmethod
     def of(
@@ -299,7 +302,7 @@ def act(
         action=action,
         command=runtime.policy.contract.action.command(action),
         mode=runtime.policy.contract.action.mode,
-        position=course.origin.points(np.asarray(course.goal.goal(state.task, elapsed))[0]),
+        position=course.origin.points(np.asarray(course.goal.goal(state.task, elapsed))[0]) if runtime.placed else None,
         late_s=late,
         inference_s=spent,
     )
@@ -315,6 +318,8 @@ def judged(runtime: Runtime, state: RuntimeState, odometry: Odometry, now: float
         return dataclasses.replace(state, odometry=odometry)
     course, elapsed = runtime.course, now - state.began
     timed_out = elapsed >= course.duration - 1e-3 * runtime.period
+    if not runtime.placed:
+        return dataclasses.replace(state, odometry=odometry, judged=elapsed, done=bool(timed_out))
     task, outcome = course.goal.advance(
         state.task, state.odometry.batch, odometry.batch, np.array([elapsed]), np.array([timed_out])
     )
@@ -362,8 +367,10 @@ def outside(runtime: Runtime, odometry: Odometry, now: float, state: RuntimeStat
     limits = (
         ("speed", float(np.linalg.norm(local.velocity)), envelope.speed, "m/s"),
         ("tilt", tilt_of(local.quaternion), envelope.tilt, "rad"),
-        ("distance", float(np.linalg.norm(local.position - where)), fence, "m from the goal"),
     )
+    if not runtime.placed:
+        return beyond(limits)
+    limits += (("distance", float(np.linalg.norm(local.position - where)), fence, "m from the goal"),)
     if course.heading is not None and state is None:
         off = math.remainder(yaw_of(local.quaternion) - course.heading, math.tau)
         told = math.degrees(course.heading + course.origin.yaw)

@@ -16,7 +16,7 @@ from e2efly.flight.log_record import Log
 from e2efly.flight.pilot.flight_state import Mode
 from e2efly.flight.pilot.hovering import HoverController
 from e2efly.flight.pose.neighbours import Neighbours
-from e2efly.flight.pose.pose_source import PlantSource
+from e2efly.flight.pose.pose_source import PlantSource, drifts
 from e2efly.flight.settings import Fence, FlightSettings
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course
@@ -121,6 +121,7 @@ class Session:
                 policy, course, vehicle, envelope=Envelope(speed=8.0), imu=True, images=bool(cameras),
                 others=neighbours is not None,
             )  # fmt: skip
+            runtime = dataclasses.replace(runtime, placed=not drifts(source))
             self.worker = PolicyWorker(runtime, PATIENCE_S)
         late = rig.latency + 0.01
         self.commander = None if commands is None else Commander(commands, vehicle, settings, latency=late)

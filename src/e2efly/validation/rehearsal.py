@@ -14,10 +14,12 @@ from e2efly.flight.pilot.fence import check_course
 from e2efly.flight.pilot.flight_state import Mode, Reason
 from e2efly.flight.pilot.hovering import hover_controller
 from e2efly.flight.pose.pose_source import PoseSource
+from e2efly.flight.pose.sources.imu_alone import ImuSource
 from e2efly.flight.settings import Fence
 from e2efly.flight.sight.image_source import ImageSource
 from e2efly.policy.goal import Course, Outcome
-from e2efly.policy.runtime import Acting, RuntimeState
+from e2efly.policy.odometry import Odometry
+from e2efly.policy.runtime import Acting, Runtime, RuntimeState, begin, judged
 from e2efly.tasks.route import Route, course_for, route_of, usual_route
 from e2efly.validation.bridge_session import REACH, FlightBench, FlownSession, Session, open_fence, rehearsal_settings
 from e2efly.validation.firmware_program import Firmware
@@ -95,12 +97,14 @@ def rehearse(
     fence: Fence | None = None,
     wrap: Callable[[ImageSource], ImageSource] = lambda camera: camera,
     gates: GateCamera | None = None,
+    placed: bool = True,
 ) -> Rehearsal:
     """Fly one whole flight. The vehicle is that of the world and of the bridge.
 
     `scenery` is the world that a policy sees. `wrap` puts a wrapper between each camera and the bridge. Without a
     `route` the course is the usual one, without a `fence` the fence is far away. With `gates` there is no motion
-    capture: the poses come from the gates of the course, as this camera sees them, and from the firmware's IMU.
+    capture: the poses come from the gates of the course, as this camera sees them, and from the firmware's IMU. If not
+    `placed`, there is no source of poses but that IMU.
 
     Raises:
         ValueError: for a course that the fence does not hold, or one without gates.
@@ -114,7 +118,8 @@ def rehearse(
         with Rig(firmware, Path(temporary), vehicle, latency=latency, seed=seed) as rig:
             sources = [] if scenery is None else scenery.sources(lambda: RigidState.of(rig.state), course.origin)
             cameras = [wrap(source) for source in sources]
-            poses = None if gates is None else gate_poses(rig, gates, course, seed)
+            poses: PoseSource | None = None if gates is None else gate_poses(rig, gates, course, seed)
+            poses = poses if placed else ImuSource()
             flight = whole_flight(rig, policy, course, seed, log, cameras, fence, poses)
     return flight if scenery is None else _unhurt(flight, scenery, course, vehicle.radius)
 
@@ -155,24 +160,53 @@ def whole_flight(
         assert worker is not None
         begun = session.fly(0.5, session.in_mode(Mode.POLICY))
         end = rig.now() + route_of(policy.contract).longest_s
-        judged: dict[int, tuple[float, Outcome]] = {}
+        verdicts: dict[float, tuple[float, Outcome]] = {}
+        spectator = None if worker.runtime.placed else Spectator.of(worker.runtime, rig)
+        ended = worker.last
         while begun and rig.now() < end and bridge.flight.mode is Mode.POLICY:
             session.step()
-            state = worker.last
-            if state is not None and state.outcome is not None:
-                judged[state.steps] = (state.judged, state.outcome)
+            ended = worker.last if spectator is None else spectator.watch(rig)
+            if ended is not None and ended.outcome is not None:
+                verdicts[ended.judged] = (ended.judged, ended.outcome)
+            if spectator is not None and ended is not None and (ended.done or ended.failure):
+                break  # the pilot sees it
         done = Reason.POLICY_DONE in bridge.flight.reasons or bridge.flight.mode is Mode.POLICY
-        ended = worker.last
         if not course.goal.lands:
             rig.set(mission="hover")
             session.fly(3.0)
         landed = session.land()
-        flight = _report(course, session.flown, up, begun, done, landed, list(judged.values()), ended)
+        flight = _report(course, session.flown, up, begun, done, landed, list(verdicts.values()), ended)
         if course.goal.lands or not _touched(session.flown, rig.world.vehicle.feet_height):
             return flight
         return dataclasses.replace(flight, complete=False, told=f"{flight.told}, touched the ground")
     finally:
         session.close()
+
+
+@dataclass
+class Spectator:
+    """Judges a policy that nobody tells where it is, by its true motion."""
+
+    runtime: Runtime
+    state: RuntimeState
+
+    @staticmethod
+    def of(runtime: Runtime, rig: FlightBench) -> "Spectator":
+        """At the moment when the policy takes over."""
+        runtime = dataclasses.replace(runtime, placed=True)
+        begun = begin(runtime, _truth(rig), rig.now())
+        return Spectator(runtime, dataclasses.replace(begun, steps=1))
+
+    def watch(self, rig: FlightBench) -> RuntimeState:
+        """The verdict after another control step."""
+        local = _truth(rig).seen_from(self.runtime.course.origin)
+        self.state = judged(self.runtime, self.state, local, rig.now())
+        return self.state
+
+
+def _truth(rig: FlightBench) -> Odometry:
+    state = RigidState.of(rig.state)
+    return Odometry(rig.now(), state.position, state.velocity, state.quaternion, state.body_rate)
 
 
 def parked(world: World, course: Course, seed: int) -> FlownBody:

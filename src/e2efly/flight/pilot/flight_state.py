@@ -34,6 +34,10 @@ GROUNDED = (Mode.INIT, Mode.DONE)
 """Modes in which the throttle is closed."""
 
 
+DRIFTED = "nobody knows where it is: poses by the IMU alone"
+"""Reported for odometry that drifts, once the flight has been too long for it."""
+
+
 class Mission(StrEnum):
     """The pilot's three-position switch."""
 
@@ -155,6 +159,9 @@ class Inputs:
     filtered: bool = False
     """A filter keeps the policy inside the fence. The guard then ends the policy's flight only outside the fence, not
     before."""
+    placeless: bool = False
+    """Nobody knows where the vehicle is, and the policy need not: its odometry drifts, and is good for a take-off, a
+    short hover and the braking after the policy's flight."""
     missed_deadlines: int = 0
     """Number of late control steps within the last second."""
 

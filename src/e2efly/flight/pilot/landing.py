@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from e2efly.flight.pilot.fence import stopping
-from e2efly.flight.pilot.flight_state import Flight, Inputs, Mode, Reason, Target, to
+from e2efly.flight.pilot.flight_state import DRIFTED, Flight, Inputs, Mode, Reason, Target, to
 from e2efly.flight.pilot.hover import blind_time
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry
@@ -48,8 +48,10 @@ RECENT_S = 0.5
 
 
 def land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
-    """Begin a landing for these reasons: with odometry if there is some, otherwise without it."""
-    if inputs.seen is None:
+    """Begin a landing for these reasons: with odometry if there is some that does not drift, otherwise without it."""
+    if inputs.placeless:
+        flight = dataclasses.replace(flight, misled=flight.misled or DRIFTED)
+    if inputs.seen is None or inputs.placeless:
         return _blindly(settings, flight, inputs, *reasons)
     return to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
 
@@ -168,7 +170,7 @@ def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tupl
     """Now, and the height over home, m, and the climb, m/s, from the newest odometry. Absolute values are used because
     it may be mirrored.
     """
-    o = inputs.odometry
+    o = None if inputs.placeless else inputs.odometry
     height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
     if not math.isfinite(height):
         height = settings.fence.high[2] - flight.home

@@ -62,7 +62,7 @@ class Reckoning:
     since: float
     """The same, but it moves on while the controller is not heard, s."""
     height: float
-    """The largest plausible height, propagated from the last odometry, world, m."""
+    """The largest plausible height, propagated from the last odometry, world, m. NaN: not known."""
     attitude: Attitude | None = None
     """The attitude up to which it is propagated. None: not known; a level attitude is assumed."""
 
@@ -104,9 +104,10 @@ class Reckonings:
         newest, grounded = (None if r is None else step(r) for r in (self.newest, self.grounded))
         return Reckonings(newest, anchors, grounded)
 
-    def alone(self, *, wrong: bool) -> "Reckonings":
+    def alone(self, *, wrong: bool, adrift: bool = False) -> "Reckonings":
         """Start a flight without poses, from the median of all reckonings. If the poses were `wrong`, perhaps for a
-        while, only the older half is used, or in a take-off what was propagated from the ground.
+        while, only the older half is used, or in a take-off what was propagated from the ground. If they have gone
+        `adrift`, their height says nothing.
         """
         if wrong and self.grounded is not None:
             return Reckonings(self.grounded)
@@ -118,7 +119,8 @@ class Reckonings:
             float(np.median(values))
             for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
         )  # fmt: skip
-        begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, height=height, doubt=DOUBT)
+        begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, doubt=DOUBT)
+        begun = replace(begun, height=math.nan if adrift else height)
         return Reckonings(begun)
 
 
@@ -202,7 +204,7 @@ def settle(attitude: Attitude | None, reckoned: Reckoning, ground: float, trim: 
 
 
 def _climb(reckoned: Reckoning, ground: float) -> float:
-    fastest = LOW_SINK if reckoned.height - ground < LOW else FASTEST_SINK
+    fastest = FASTEST_SINK if reckoned.height - ground >= LOW else LOW_SINK  # slow where the height is not known
     return max(-SINK_SPEED - SINK_FASTER * (reckoned.time - reckoned.since), -fastest)
 
 

@@ -89,8 +89,10 @@ def policy_refusals(settings: FlightSettings, flight: Flight, inputs: Inputs, od
     reasons += _sensing(inputs)
     reasons += _sticks(settings, inputs.pilot, Reason.STICK_INPUT)
     age = max(flight.now - odometry.time, 0.0)
-    if problem := fence_problem(
-        settings.fence, odometry, not inputs.policy_lands, guard=not inputs.filtered, age=age, force=inputs.force
+    if not inputs.placeless and (
+        problem := fence_problem(
+            settings.fence, odometry, not inputs.policy_lands, guard=not inputs.filtered, age=age, force=inputs.force
+        )
     ):
         reasons.append(problem)
     if inputs.missed_deadlines >= settings.missed_deadlines:

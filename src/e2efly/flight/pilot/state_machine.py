@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from e2efly.flight.pilot.fence import here, moved, stopping
-from e2efly.flight.pilot.flight_state import AIRBORNE, Flight, Inputs, Mission, Mode, Reason, Target, to
+from e2efly.flight.pilot.flight_state import AIRBORNE, DRIFTED, Flight, Inputs, Mission, Mode, Reason, Target, to
 from e2efly.flight.pilot.landing import SLOW, has_stood, land, landing, looked, stands
 from e2efly.flight.pilot.refusals import ON_GROUND, battery_refusals, policy_refusals, take_off_refusals
 from e2efly.flight.settings import FlightSettings
@@ -36,6 +36,8 @@ MISLED = "the vehicle does not go where it is sent (wrong heading?)"
 """Reported for odometry that is not that of the vehicle ..."""
 TURNED = "its heading is wrong"
 """... and for odometry whose heading is not that of the vehicle."""
+ADRIFT_S = 5.0
+"""How long a vehicle hovers by poses that drift, s: long enough to hand over to the policy, and to brake after it."""
 FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
 """A vehicle has fallen if it is tilted by more than the first value, rad, and slower than the second, m/s, for the time
 of the third, s. In the air, gravity alone would have made it faster."""
@@ -218,6 +220,8 @@ def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) 
     flight = looked(flight, inputs)
     if has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
         return land(settings, flight, inputs, f"{Reason.NOT_CLIMBING}: it stands where it took off")
+    if inputs.placeless and flight.now - flight.since > ADRIFT_S:
+        return land(settings, flight, inputs, f"{Reason.NO_ODOMETRY}: {DRIFTED}")
     if inputs.pilot.mission is Mission.POLICY:
         refusals = policy_refusals(settings, flight, inputs, inputs.odometry)
         if not refusals:
@@ -244,6 +248,8 @@ def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float)
             return land(settings, flight, inputs, *reasons)
     else:
         reasons = policy_refusals(settings, flight, inputs, inputs.odometry)
+    if reasons and inputs.placeless:  # it brakes; where the fence is, nobody knows
+        return to(flight, Mode.HOVER, *reasons, target=stopping(settings.fence.opened, inputs.odometry), lock=True)
     if reasons:
         return to(
             flight,
@@ -261,10 +267,10 @@ def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: fl
     odometry = inputs.seen
     if not inputs.override or inputs.link_problem:
         return dataclasses.replace(flight, target=_here(inputs))
-    if odometry is None:
-        return land(settings, flight, inputs, Reason.OVERRIDE_ON, inputs.blindness)
-    if stands(settings, flight, odometry):
+    if odometry is not None and stands(settings, flight, odometry):
         return to(flight, Mode.INIT, Reason.OVERRIDE_ON, rearm=True)
+    if odometry is None or inputs.placeless:
+        return land(settings, flight, inputs, Reason.OVERRIDE_ON, DRIFTED if inputs.placeless else inputs.blindness)
     return to(flight, Mode.HOVER, Reason.OVERRIDE_ON, target=here(odometry), lock=True)
 
 

@@ -47,18 +47,31 @@ class PoseSource(Protocol):
 
 @runtime_checkable
 class AidedSource(PoseSource, Protocol):
-    """A source that carries its poses on by the IMU of the flight controller."""
+    """A source that carries its poses on by the IMU of the flight controller.
 
-    def feel(self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool) -> None:
+    One whose place drifts away, because nothing corrects it in flight, has an attribute `drifts` that is true.
+    """
+
+    def feel(
+        self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool,
+        attitude: tuple[float, np.ndarray] | None = None,
+    ) -> None:  # fmt: skip
         """A sample of the IMU.
 
         Args:
             time: when it was taken, s.
             gyroscope: (3,) body rate, rad/s.
             force: (3,) specific force, body, m/s^2.
-            standing: the vehicle is on the ground, disarmed. It may be carried.
+            standing: the vehicle is on the ground with its motors stopped. It may be carried.
+            attitude: the flight controller's own, and when it was true: s, and (4,) unit quaternion wxyz. Its heading
+                has an origin of its own. None: not known.
         """
         ...
+
+
+def drifts(source: object) -> bool:
+    """Whether the place that a source tells drifts away in flight; see `AidedSource`."""
+    return bool(getattr(source, "drifts", False))
 
 
 class PlantSource:

@@ -59,8 +59,12 @@ class GateSource:
         """What is estimated. None: the IMU has not been felt."""
         return self._estimator
 
-    def feel(self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool) -> None:
-        """See `AidedSource.feel`."""
+    def feel(
+        self, time: float, gyroscope: np.ndarray, force: np.ndarray, *, standing: bool,
+        attitude: tuple[float, np.ndarray] | None = None,
+    ) -> None:  # fmt: skip
+        """See `AidedSource.feel`. The gates correct the attitude; the flight controller's is not needed."""
+        del attitude
         estimator, last = self._estimator, self._last
         self._last = gyroscope, force
         dt = np.inf if estimator is None else time - estimator.state.time
