@@ -106,12 +106,41 @@ def test_it_tells_nothing_while_it_is_carried_and_starts_anew_where_it_is_put_do
         source.feel(time, np.array([0.0, 0.0, 1.0]), UP, standing=True)
         time += DT
     assert source.read(time) == [] and source.problem == "imu: it is being moved; put it down"
-    source.feel(time, BIAS, UP, standing=True)
+    for _ in range(60):
+        source.feel(time, BIAS, UP, standing=True)
+        time += DT
     assert source.read(time) == [] and source.problem == "imu: it has just been put down"
     for _ in range(120):
         time += DT
         source.feel(time, BIAS, UP, standing=True)
     assert newest(source, time).position.tolist() == [0.0, 0.0, 0.0] and source.problem is None
+
+
+def test_rotors_that_idle_shake_it_and_do_not_carry_it() -> None:
+    source, time = rested(Rotation.identity())
+    random = np.random.default_rng(0)
+    for _ in range(300):
+        shaken = UP + random.normal(0.0, 1.0, 3)
+        source.feel(time, BIAS + random.normal(0.0, 0.1, 3), shaken, standing=True)
+        time += DT
+        assert source.read(time), source.problem
+
+
+def test_after_a_flight_it_is_levelled_anew_where_it_stands() -> None:
+    source, time = rested(Rotation.identity())
+    slope = Rotation.from_euler("x", 0.15)
+    for _ in range(50):
+        source.feel(time, BIAS, UP, standing=False)
+        time += DT
+    assert source.read(time)
+    for _ in range(90):
+        source.feel(time, BIAS, slope.inv().apply(UP), standing=True)
+        time += DT
+        assert source.read(time) == []
+    for _ in range(300):
+        source.feel(time, BIAS, slope.inv().apply(UP), standing=True)
+        time += DT
+    np.testing.assert_allclose(newest(source, time).quaternion, quaternion(slope), atol=1e-3)
 
 
 def test_after_a_pause_in_flight_it_knows_nothing_until_it_stands() -> None:

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from e2efly.flight.attitude import Attitude
+from e2efly.flight.pilot.flight_state import Flight, Mode
+from e2efly.flight.pilot.guidance import descend
 from e2efly.flight.pilot.hover import blind_time
+from e2efly.flight.pilot.inertial import Inertial
 from e2efly.flight.pilot.reckoning import (
     ANCHOR_S,
     ANCHORS,
@@ -21,6 +24,7 @@ from e2efly.flight.pilot.reckoning import (
     settle,
     trimmed,
 )
+from e2efly.flight.pilot.touch import Touch
 from e2efly.policy.odometry import Odometry
 from e2efly.vehicles.gravity import GRAVITY
 
@@ -157,3 +161,29 @@ def test_poses_that_go_on_through_a_silence_replace_the_older_ones() -> None:
     assert oldest.begun > 3.0 - (ANCHORS + 1) * ANCHOR_S - DT
     assert reckonings.alone(wrong=True).newest is not None
     assert oldest.climb > -0.5 * GRAVITY * (ANCHORS + 1) * ANCHOR_S
+
+
+@pytest.mark.parametrize(("climb", "lean"), [(-1.5, 0.0), (-0.5, -0.1), (0.6, 0.05), (0.0, 0.0)])
+def test_where_the_height_is_not_known_it_sinks_however_wrong_the_speed(climb: float, lean: float) -> None:
+    """The speed is `climb` more than the true one, accelerometer and map tell `lean` m/s^2 too much, and the height is
+    only known to be at most 4.5 m.
+    """
+    z, v, trim, tops = 2.5, 0.0, 0.0, [2.5]
+    poses = Reckonings(Reckoning((0.0, 0.0, climb), climb, 0.05, 0.0, 0.0, 0.0, -30.0))
+    told = Inertial(reckonings=poses.alone(wrong=False, height=4.5))
+    flight, level = Flight(Mode.LAND, blind=True, lost=(0.0, 4.5, 0.0)), Attitude(0.0, 0.0, 0.0)
+    for k in range(round(25 / DT)):
+        now = (k + 1) * DT
+        command, trim, told = descend(flight, told, level, trim, now, DT)
+        force = float(command.thrust)
+        v, z = v + (force - GRAVITY) * DT, z + v * DT
+        tops.append(z)
+        assert told.reckoned is not None
+        on = reckon(told.reckoned, level, (0.0, 0.0, force + lean), (force + lean, 0.0), STILL, now)
+        told = dataclasses.replace(told, reckonings=Reckonings(on), touch=Touch())
+        if z < 0:
+            break
+    assert z < 0, "it does not stay in the air"
+    assert max(tops) < 5.5
+    if abs(climb) < 1:
+        assert v > -4.0

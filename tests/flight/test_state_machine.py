@@ -363,21 +363,23 @@ def test_landing_sinks_slowly_and_ends_when_it_stands() -> None:
 
 NOWHERE = having(AWAY, placeless=True)
 """A policy that is told no place, by poses that drift."""
+RACING = at(-7.0, x=500.0, velocity=(9.0, 0, -2.0))
+
+
+def racing() -> Flight:
+    return reached(Mode.POLICY, reached(Mode.POLICY, hovering(), NOWHERE), having(NOWHERE, odometry=RACING), 1.0)
 
 
 def test_without_a_place_no_fence_ends_a_policy_and_its_end_is_a_short_hover() -> None:
-    far = at(-7.0, x=500.0, velocity=(9.0, 0, 0))
-    flight = reached(Mode.POLICY, hovering(), NOWHERE)
-    flight = reached(Mode.POLICY, flight, having(NOWHERE, odometry=far), 1.0)
-    ended = having(NOWHERE, odometry=far, pilot=HOVER)
-    flight = reached(Mode.HOVER, flight, ended)
+    ended = having(NOWHERE, odometry=RACING, pilot=HOVER)
+    flight = reached(Mode.HOVER, racing(), ended)
     assert flight.target is not None
     x, y, z = flight.target.position
-    assert 505 < x < 512 and (y, z) == (0.0, -7.0), "it brakes where it is, wherever the fence is"
-    flight = flown(flight, ended, 4.9)
-    assert flight.mode is Mode.HOVER
+    assert 505 < x < 512 and (y, z) == (0.0, -7.0), "it brakes where it is, wherever the fence is, and dives no deeper"
+    flight = reached(Mode.HOVER, flight, ended, 4.9)
     flight = reached(Mode.LAND, flight, ended, 0.3)
     assert flight.blind and flight.misled == DRIFTED and said(flight, Reason.NO_ODOMETRY)
+    assert flight.lost is not None and flight.lost[1] == SETTINGS.fence.high[2] - flight.home, "it may be as high"
     still = having(ended, odometry=at(0.05))
     flight = reached(Mode.LAND, flight, still, 2.0)
     assert flight.blind, "no such pose is believed again in this landing"
@@ -385,6 +387,23 @@ def test_without_a_place_no_fence_ends_a_policy_and_its_end_is_a_short_hover() -
     assert said(flight, Reason.TOUCHED)
     flight = reached(Mode.INIT, flight, having(still, stands=True, armed=False), 0.1)
     assert flight.misled is None
+
+
+@pytest.mark.parametrize("pilot", [LAND, None])
+def test_without_a_place_it_brakes_before_it_lands(pilot: Pilot | None) -> None:
+    asked = having(NOWHERE, odometry=RACING, pilot=pilot)
+    flight = reached(Mode.HOVER, racing(), asked)
+    flight = reached(Mode.HOVER, flight, asked, 2.0)
+    slow = having(asked, odometry=at(-7.0, x=510.0, velocity=(0.5, 0, 0)))
+    assert reached(Mode.LAND, flight, slow).blind
+    assert reached(Mode.LAND, flight, asked, 1.2).blind, "for a time"
+    lame = having(asked, accelerometer_problem="its numbers do not change")
+    assert reached(Mode.LAND, flight, lame).blind, "not by sensors that are wrong"
+
+
+def test_without_a_place_whatever_else_is_wrong_the_height_is_not_believed() -> None:
+    flight = flown(racing(), having(NOWHERE, odometry=RACING, motion_problem="late", heading_error=2.0))
+    assert flight.mode is Mode.LAND and flight.blind and flight.misled == DRIFTED and flight.turned is None
 
 
 def test_without_a_place_it_hovers_for_seconds_and_lands_blind_for_any_reason() -> None:
@@ -396,12 +415,28 @@ def test_without_a_place_it_hovers_for_seconds_and_lands_blind_for_any_reason() 
     assert asked.blind and said(asked, Reason.MISSION)
 
 
-def test_without_a_place_a_vehicle_that_is_handed_over_in_the_air_sinks_level() -> None:
-    flight = reached(Mode.PILOT, hovering(), having(UP, placeless=True, override=False))
-    flight = reached(Mode.LAND, flight, having(UP, placeless=True))
-    assert flight.blind and said(flight, Reason.OVERRIDE_ON)
-    grounded = reached(Mode.PILOT, hovering(), having(UP, placeless=True, override=False))
-    assert reached(Mode.INIT, grounded, having(UP, odometry=at(), placeless=True)).blind is False
+def test_without_a_place_only_the_throttle_stick_tells_whether_a_vehicle_that_is_handed_over_flies() -> None:
+    flown_by_hand = having(UP, placeless=True, override=False)
+    for odometry in (at(), at(1.05), at(7.0, velocity=(3, 0, 0))):
+        flight = reached(Mode.PILOT, hovering(), flown_by_hand)
+        back = having(UP, odometry=odometry, placeless=True)
+        sinks = reached(Mode.LAND, flight, back)
+        assert sinks.blind and said(sinks, Reason.OVERRIDE_ON)
+        down = dataclasses.replace(HOVER, throttle=-1.0)
+        assert reached(Mode.INIT, flight, having(back, pilot=down)).blind is False
+
+
+@pytest.mark.parametrize(
+    ("force", "rate", "lies"),
+    [((9.0, 0, 3.0), 0.0, True), ((0, 0, 9.8), 0.0, False), ((9.0, 0, 3.0), 2.0, False), ((18.0, 0, 3.0), 0.0, False)],
+)
+def test_without_a_place_a_vehicle_on_its_side_is_known_by_its_sensors(
+    force: tuple[float, ...], rate: float, lies: bool
+) -> None:
+    tipped = dataclasses.replace(at(3.0, velocity=(1.0, 0, 0), roll=1.3), body_rate=np.array([rate, 0, 0]))
+    inputs = having(NOWHERE, odometry=tipped, force=np.array(force))
+    flight = flown(racing(), inputs, 0.7)
+    assert (flight.mode is Mode.DONE and said(flight, Reason.CRASHED)) is lies
 
 
 def test_a_landing_begins_where_the_vehicle_can_stop_and_no_higher_than_it_is() -> None:

@@ -52,7 +52,8 @@ SLOWEST = 0.5
 """Largest `--latency`, s: with more delay no gains hold a hover."""
 NOWHERE = (
     "Nobody knows where the vehicle is: no fence holds it, the policy's flight ends by your mission switch, and the "
-    "hover and the landing after it drift. Have the override switch at hand."
+    "hover and the landing after it drift. Have the override switch at hand. It must not fly higher than the top of "
+    "the fence (--flight.fence.high): a landing takes that for its height."
 )
 """What `--pose imu` cannot promise."""
 
@@ -275,8 +276,7 @@ def run(options: Fly) -> int:
         if runtime is not None and not excited:
             if drifts(source):
                 console.print(NOWHERE, style="bold")
-            else:
-                check_course(settings.fence, runtime.course)
+            check_course(settings.fence.height if drifts(source) else settings.fence, runtime.course)
             runtime = dataclasses.replace(runtime, placed=not drifts(source))
         others = [stack.enter_context(closing(open_source(uri))) for uri in options.others]
         needs = (contract.others if contract else None) or USUAL

@@ -157,6 +157,10 @@ class Bridge:
                 f"the pose source is {source.describe()}; accepted: for a policy that is told neither place nor "
                 "velocity, such as race_eyes, and without --guard filter"
             )
+        if self.placeless and settings.ground_height:
+            raise ValueError(
+                f"flight.ground_height is {settings.ground_height:g}; accepted with {source.describe()}: 0"
+            )
 
     def tick(self, now: float, lateness: float = 0.0, slack: float = 0.004) -> Sent:
         """Run one control step at `now` s that began `lateness` s late. A policy that is due within `slack` s acts in
@@ -220,7 +224,7 @@ class Bridge:
         samples, known = self.source.read(now), autopilot.attitude(now, ATTITUDE_S)
         attitude = None if known is None else known[0]
         self.estimate = estimate.see(self.estimate, samples, self.flight, attitude, now, self.source.problem or "")
-        if samples and self.odometry is not None:
+        if samples and self.odometry is not None and not self.placeless:
             autopilot.pose(now, self.odometry)
         if self.worker is not None:
             self.worker.hear(self.odometry, now)
@@ -319,7 +323,7 @@ class Bridge:
                 self.imu = Imu(measured.gyro, force)
                 if self._aided is not None:
                     # the throttle of an armed vehicle is closed, too, while this program has it on the ground
-                    held = flight.mode is Mode.INIT and inputs.override
+                    held = flight.mode in GROUNDED and inputs.override
                     stands, own = measured.standing or held, None
                     if attitude is not None:
                         if attitude[1] != self._levelled[0]:

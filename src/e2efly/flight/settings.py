@@ -34,8 +34,13 @@ class Fence:
 
     @property
     def opened(self) -> "Fence":
-        """This fence without its sides."""
+        """This fence without its sides, its floor and its top."""
         return replace(self, low=(-math.inf,) * 3, high=(math.inf,) * 3)
+
+    @property
+    def height(self) -> "Fence":
+        """Its floor and its top alone."""
+        return replace(self, low=(-math.inf, -math.inf, self.low[2]), high=(math.inf, math.inf, self.high[2]))
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class BPTT(Algorithm):
         if config.league and env.agents == 1:
             raise ValueError(f"algo.league is {config.league}; accepted: 0, or a task with several vehicles in a world")
         if config.imitated is not None:
-            Expert().check(env, "algo.imitated", config.imitated)
+            Expert().check(env, "algo.imitated", config.imitated, "None")
         policy = self.actor.init(np.random.default_rng(seed), np.asarray(env.hover))
         members = founded(policy, config.league) if config.league else None
         return BPTTParameters(policy, jax.tree.map(np.copy, policy), members)
@@ -92,7 +92,8 @@ class BPTT(Algorithm):
         policy = parameters.learner
         if config.average is not None:
             count = optax.tree_utils.tree_get(after.optimizer, "count").astype(jnp.float32)
-            kept = jnp.minimum(config.average, 1 - 1 / count)  # with few policies, their plain mean
+            steps = 1 if share is None else jnp.where(progress < share, config.horizon // IMITATION_WINDOW, 1)
+            kept = jnp.minimum(config.average, 1 - steps / count)  # with few policies, their plain mean
             policy = jax.tree.map(lambda a, b: b + kept * (a - b), parameters.policy, parameters.learner)
         return dataclasses.replace(after, parameters=dataclasses.replace(parameters, policy=policy)), metrics
 
@@ -137,7 +138,9 @@ class BPTT(Algorithm):
 
         first = RolloutState.of(state), old.learner, state.optimizer
         (end, learner, optimizer), metrics = jax.lax.scan(step, first, None, length=config.horizon // IMITATION_WINDOW)
-        told = {name: jnp.sum(x) if name == "episodes" else jnp.mean(x) for name, x in metrics.items()}
+        ended = jnp.sum(metrics["episodes"])
+        told = {name: jnp.mean(x) for name, x in metrics.items()} | {"episodes": ended}
+        told["train_success"] = jnp.sum(metrics["train_success"] * metrics["episodes"]) / jnp.maximum(ended, 1)
         names = [name.removeprefix("reward/") for name in told if name.startswith("reward/")]
         told |= {f"gradient/{name}": jnp.float32(0.0) for name in names if config.term_gradients}
         return end.into(state, parameters=dataclasses.replace(old, learner=learner), optimizer=optimizer, key=key), told

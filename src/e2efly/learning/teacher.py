@@ -84,14 +84,19 @@ class Expert:
         """Its actions."""
         return env.expert_action(state), memory
 
-    def check(self, env: Env, option: str = "algo.teacher", value: object = EXPERT) -> None:
+    def check(
+        self, env: Env, option: str = "algo.teacher", value: object = EXPERT, otherwise: str = "a policy"
+    ) -> None:
         """Refuse a task without an expert, and commands that it does not give, for an option that asks for an expert.
+        `otherwise` is what else that option accepts.
 
         Raises:
             ValueError: naming the option, its value and what is accepted.
         """
         if not isinstance(env.task, Guided) or env.physics.command_mode != "ctbr":
-            raise ValueError(f"{option} is {value}; accepted: for a task with an expert and env.command_mode ctbr")
+            raise ValueError(
+                f"{option} is {value}; accepted: for a task with an expert and env.command_mode ctbr, or {otherwise}"
+            )
 
 
 @cache

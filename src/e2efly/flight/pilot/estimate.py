@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from e2efly.flight.attitude import Attitude, attitude_of
 from e2efly.flight.pilot import inertial
 from e2efly.flight.pilot.delay_watch import DelayWatch, MeasuredDelay, delay_of, delay_problem, felt, turned
-from e2efly.flight.pilot.flight_state import DRIFTED, GROUNDED, Flight, Mode
+from e2efly.flight.pilot.flight_state import GROUNDED, Flight, Mode
 from e2efly.flight.pilot.heading_watch import HeadingWatch, watched
 from e2efly.flight.pilot.hover import LIFTED
 from e2efly.flight.pilot.inertial import Inertial, Measurement
@@ -209,8 +209,8 @@ def enter(before: StateEstimate, flight_before: Flight, flight: Flight) -> State
     """
     told, delays = before.inertial, before.delays
     if flight.blind and not flight_before.blind and flight.turned is None:
-        adrift = flight.misled == DRIFTED
-        told = inertial.alone(told, wrong=flight.misled is not None and not adrift, adrift=adrift)
+        top = flight.home + flight.lost[1] if flight.adrift and flight.lost is not None else None
+        told = inertial.alone(told, wrong=flight.misled is not None and not flight.adrift, height=top)
     if flight.mode is not flight_before.mode:
         flown = replace(told, touch=told.touch.afresh(), reckonings=replace(told.reckonings, grounded=None))
         told = told.at_rest() if flight.mode is Mode.TAKEOFF else flown

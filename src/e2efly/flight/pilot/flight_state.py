@@ -231,6 +231,8 @@ class Flight:
     """The smallest horizontal distance to the target so far, m. Infinite until the vehicle was slow there once."""
     turned: float | None = None
     """The error of the odometry's heading, because of which the odometry counts as lost, rad."""
+    adrift: bool = False
+    """Nobody knows where the vehicle is (`Inputs.placeless`)."""
     misled: str | None = None
     """Why the odometry is not that of this vehicle. It then counts as lost until the vehicle stands. None: it is."""
 

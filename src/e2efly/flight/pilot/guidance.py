@@ -86,7 +86,7 @@ def descend(
     """
     reckoned = told.reckoned
     under = -math.inf if reckoned is None else flight.home - reckoned.height
-    felt = told.touch.weigh(now, low=not under <= UNDER)  # true where the height is not known
+    felt = told.touch.weigh(now, low=under > UNDER)
     if reckoned is None:
         command = blind(attitude, now - flight.since, 0.0 if flight.lost is None else flight.lost[2])
         thrust = float(command.thrust)

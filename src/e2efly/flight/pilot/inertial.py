@@ -249,9 +249,9 @@ def carry(
     return replace(after, held=begun.on(on(held, held_rate)))
 
 
-def alone(before: Inertial, *, wrong: bool, adrift: bool = False) -> Inertial:
-    """Continue without poses; see `Reckonings.alone`. After poses that drift (`adrift`) the height is not known."""
+def alone(before: Inertial, *, wrong: bool, height: float | None = None) -> Inertial:
+    """Continue without poses; see `Reckonings.alone`."""
     if wrong and before.learned:
         before = replace(before, scale=before.learned[0][1])
-    held = None if before.held is None else before.held.alone(wrong=wrong, adrift=adrift)
-    return replace(before, reckonings=before.reckonings.alone(wrong=wrong, adrift=adrift), held=held)
+    held = None if before.held is None else before.held.alone(wrong=wrong, height=height)
+    return replace(before, reckonings=before.reckonings.alone(wrong=wrong, height=height), held=held)

@@ -49,9 +49,9 @@ RECENT_S = 0.5
 
 def land(settings: FlightSettings, flight: Flight, inputs: Inputs, *reasons: str) -> Flight:
     """Begin a landing for these reasons: with odometry if there is some that does not drift, otherwise without it."""
-    if inputs.placeless:
-        flight = dataclasses.replace(flight, misled=flight.misled or DRIFTED)
-    if inputs.seen is None or inputs.placeless:
+    if flight.adrift:  # from here on its odometry counts as lost, whatever else there is to say of it
+        flight = dataclasses.replace(flight, misled=DRIFTED, turned=None)
+    if inputs.seen is None or flight.adrift:
         return _blindly(settings, flight, inputs, *reasons)
     return to(flight, Mode.LAND, *reasons, target=_down_from(settings, inputs.seen))
 
@@ -168,9 +168,9 @@ def has_stood(settings: FlightSettings, flight: Flight, odometry: Odometry | Non
 
 def _last_seen(settings: FlightSettings, flight: Flight, inputs: Inputs) -> tuple[float, float, float]:
     """Now, and the height over home, m, and the climb, m/s, from the newest odometry. Absolute values are used because
-    it may be mirrored.
+    it may be mirrored. Without odometry, and if it drifts, the height is the largest that the fence allows.
     """
-    o = None if inputs.placeless else inputs.odometry
+    o = None if flight.adrift else inputs.odometry
     height, climb = (math.nan, math.nan) if o is None else (float(o.position[2]) - flight.home, float(o.velocity[2]))
     if not math.isfinite(height):
         height = settings.fence.high[2] - flight.home

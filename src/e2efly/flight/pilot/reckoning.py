@@ -62,7 +62,7 @@ class Reckoning:
     since: float
     """The same, but it moves on while the controller is not heard, s."""
     height: float
-    """The largest plausible height, propagated from the last odometry, world, m. NaN: not known."""
+    """The largest plausible height, propagated from the last odometry, world, m."""
     attitude: Attitude | None = None
     """The attitude up to which it is propagated. None: not known; a level attitude is assumed."""
 
@@ -104,10 +104,10 @@ class Reckonings:
         newest, grounded = (None if r is None else step(r) for r in (self.newest, self.grounded))
         return Reckonings(newest, anchors, grounded)
 
-    def alone(self, *, wrong: bool, adrift: bool = False) -> "Reckonings":
+    def alone(self, *, wrong: bool, height: float | None = None) -> "Reckonings":
         """Start a flight without poses, from the median of all reckonings. If the poses were `wrong`, perhaps for a
-        while, only the older half is used, or in a take-off what was propagated from the ground. If they have gone
-        `adrift`, their height says nothing.
+        while, only the older half is used, or in a take-off what was propagated from the ground. If their height says
+        nothing, `height` is the largest plausible one, world, m.
         """
         if wrong and self.grounded is not None:
             return Reckonings(self.grounded)
@@ -115,12 +115,12 @@ class Reckonings:
         if not every:
             return self
         believed = every[: (len(every) + 1) // 2] if wrong else every
-        ahead, left, up, lifted, height = (
+        ahead, left, up, lifted, seen = (
             float(np.median(values))
             for values in zip(*((*r.velocity, r.lifted, r.height) for r in believed), strict=True)
         )  # fmt: skip
         begun = replace(every[-1], velocity=(ahead, left, up), lifted=lifted, doubt=DOUBT)
-        begun = replace(begun, height=math.nan if adrift else height)
+        begun = replace(begun, height=seen if height is None else height)
         return Reckonings(begun)
 
 
@@ -204,7 +204,7 @@ def settle(attitude: Attitude | None, reckoned: Reckoning, ground: float, trim: 
 
 
 def _climb(reckoned: Reckoning, ground: float) -> float:
-    fastest = FASTEST_SINK if reckoned.height - ground >= LOW else LOW_SINK  # slow where the height is not known
+    fastest = LOW_SINK if reckoned.height - ground < LOW else FASTEST_SINK
     return max(-SINK_SPEED - SINK_FASTER * (reckoned.time - reckoned.since), -fastest)
 
 

@@ -20,6 +20,7 @@ from e2efly.flight.pilot.landing import SLOW, has_stood, land, landing, looked, 
 from e2efly.flight.pilot.refusals import ON_GROUND, battery_refusals, policy_refusals, take_off_refusals
 from e2efly.flight.settings import FlightSettings
 from e2efly.policy.odometry import Odometry, tilt_of
+from e2efly.vehicles.gravity import GRAVITY
 
 LONGEST_STEP = 0.1
 """The longest time that one step may count, s, even if the clock jumps."""
@@ -36,8 +37,16 @@ MISLED = "the vehicle does not go where it is sent (wrong heading?)"
 """Reported for odometry that is not that of the vehicle ..."""
 TURNED = "its heading is wrong"
 """... and for odometry whose heading is not that of the vehicle."""
+THROTTLE_LOW = -0.9
+"""Without a place, a vehicle that is handed over with its throttle stick below this stands on the ground."""
+BRAKES_S, BRAKED = 3.0, 1.0
+"""Without a place, a vehicle that is to land brakes first: for the time of the first value, s, at most, while it is
+faster than the second, m/s."""
 ADRIFT_S = 5.0
 """How long a vehicle hovers by poses that drift, s: long enough to hand over to the policy, and to brake after it."""
+LYING, LYING_UP, LYING_RATE = 0.3, 0.6, 0.5
+"""The force on a vehicle that lies still differs from its weight by less than this share, its part along the z axis is
+below the second value, in units of gravity, and it turns slower than the third, rad/s."""
 FALLEN, FALLEN_SPEED, FALLEN_S = math.radians(60), 0.3, 0.5
 """A vehicle has fallen if it is tilted by more than the first value, rad, and slower than the second, m/s, for the time
 of the third, s. In the air, gravity alone would have made it faster."""
@@ -63,6 +72,7 @@ def step(settings: FlightSettings, flight: Flight, inputs: Inputs, now: float) -
         lost=None if flight.lost is None else (flight.lost[0] + jump, *flight.lost[1:]),
         rearm=flight.rearm and not _mission_low(inputs),
         lock=flight.lock and policy,
+        adrift=inputs.placeless,
     )
     flight = _watched(settings, flight, inputs)
     if flight.misled:
@@ -95,14 +105,15 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     odometry, target = inputs.seen, flight.target
     if odometry is None:
         return dataclasses.replace(flight, fallen_since=None)
-    fallen = tilt_of(odometry.quaternion) > FALLEN and float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
+    fallen = tilt_of(odometry.quaternion) > FALLEN and _lies(inputs, odometry)
     fallen_since = (flight.now if flight.fallen_since is None else flight.fallen_since) if fallen else None
     flight = dataclasses.replace(flight, fallen_since=fallen_since)
     error = inputs.heading_error
     if flight.misled and flight.turned is not None and error is not None:
         flight = dataclasses.replace(flight, turned=error)
     if flight.mode is Mode.PILOT:
-        misled = None if stands(settings, flight, odometry) else flight.misled
+        stood = not flight.adrift and stands(settings, flight, odometry)
+        misled = None if stood else flight.misled
         return dataclasses.replace(flight, misled=misled, turned=flight.turned if misled else None)
     if target is None:
         return flight
@@ -115,6 +126,18 @@ def _watched(settings: FlightSettings, flight: Flight, inputs: Inputs) -> Flight
     nearest = min(flight.nearest, off) if rests else math.inf
     misled = flight.misled or (MISLED if off > nearest + settings.follow_distance else None)
     return dataclasses.replace(flight, nearest=nearest, misled=misled)
+
+
+def _lies(inputs: Inputs, odometry: Odometry) -> bool:
+    """Whether a tilted vehicle rests. If its velocity drifts, by the sensors: what carries it in flight are its rotors,
+    along its z axis.
+    """
+    if not inputs.placeless:
+        return float(np.linalg.norm(odometry.velocity)) < FALLEN_SPEED
+    if inputs.force is None or float(np.linalg.norm(odometry.body_rate)) > LYING_RATE:
+        return False
+    weight = float(np.linalg.norm(inputs.force)) / GRAVITY
+    return abs(weight - 1) < LYING and float(inputs.force[2]) < LYING_UP * GRAVITY
 
 
 def _nearly_landed(flight: Flight, inputs: Inputs) -> bool:
@@ -212,15 +235,18 @@ def _take_off(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: floa
 
 
 def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
-    if reasons := _must_land(settings, inputs):
+    reasons = _must_land(settings, inputs)
+    if reasons and _brakes(flight, inputs):
+        return dataclasses.replace(flight, reasons=reasons)
+    if reasons:
         return land(settings, flight, inputs, *reasons)
     assert flight.target is not None
     assert inputs.odometry is not None
     assert inputs.pilot is not None
     flight = looked(flight, inputs)
-    if has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
+    if not flight.adrift and has_stood(settings, flight, inputs.odometry) and inputs.stands is not False:
         return land(settings, flight, inputs, f"{Reason.NOT_CLIMBING}: it stands where it took off")
-    if inputs.placeless and flight.now - flight.since > ADRIFT_S:
+    if flight.adrift and flight.now - flight.since > ADRIFT_S:
         return land(settings, flight, inputs, f"{Reason.NO_ODOMETRY}: {DRIFTED}")
     if inputs.pilot.mission is Mission.POLICY:
         refusals = policy_refusals(settings, flight, inputs, inputs.odometry)
@@ -233,23 +259,34 @@ def _hover(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) 
     return dataclasses.replace(flight, target=target, nearest=nearest)
 
 
+def _brakes(flight: Flight, inputs: Inputs) -> bool:
+    """Whether a hover without a place goes on although it should land: the landing would sink at this speed."""
+    if not flight.adrift or inputs.seen is None or inputs.link_problem or inputs.accelerometer_problem:
+        return False
+    return flight.now - flight.since < BRAKES_S and float(np.linalg.norm(inputs.seen.velocity)) > BRAKED
+
+
 def _policy(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: float) -> Flight:
     del dt
-    if lost := _lost(inputs):
-        return land(settings, flight, inputs, *lost)
+    reasons = _lost(inputs)
+    if reasons and (not flight.adrift or inputs.seen is None or inputs.link_problem):
+        return land(settings, flight, inputs, *reasons)
     assert inputs.odometry is not None
-    assert inputs.pilot is not None
-    reasons: tuple[str, ...] = ()
-    if inputs.pilot.mission is not Mission.POLICY:
+    if inputs.pilot is None:
+        pass  # without a place it brakes first
+    elif inputs.pilot.mission is not Mission.POLICY:
         reasons = (Reason.MISSION,)
     elif inputs.policy_done:
         reasons = (Reason.POLICY_DONE,)
-        if float(inputs.odometry.position[2]) - settings.ground_height < ON_GROUND:
+        if not flight.adrift and float(inputs.odometry.position[2]) - settings.ground_height < ON_GROUND:
             return land(settings, flight, inputs, *reasons)
     else:
         reasons = policy_refusals(settings, flight, inputs, inputs.odometry)
-    if reasons and inputs.placeless:  # it brakes; where the fence is, nobody knows
-        return to(flight, Mode.HOVER, *reasons, target=stopping(settings.fence.opened, inputs.odometry), lock=True)
+    if reasons and flight.adrift:  # it brakes, and dives no deeper; where the fence is, nobody knows
+        target = stopping(settings.fence.opened, inputs.odometry)
+        x, y, z = target.position
+        level = dataclasses.replace(target, position=(x, y, max(z, float(inputs.odometry.position[2]))))
+        return to(flight, Mode.HOVER, *reasons, target=level, lock=True)
     if reasons:
         return to(
             flight,
@@ -267,10 +304,14 @@ def _with_pilot(settings: FlightSettings, flight: Flight, inputs: Inputs, dt: fl
     odometry = inputs.seen
     if not inputs.override or inputs.link_problem:
         return dataclasses.replace(flight, target=_here(inputs))
-    if odometry is not None and stands(settings, flight, odometry):
+    if flight.adrift:  # only the pilot knows whether it flies
+        if inputs.pilot is not None and inputs.pilot.throttle < THROTTLE_LOW:
+            return to(flight, Mode.INIT, Reason.OVERRIDE_ON, rearm=True)
+        return land(settings, flight, inputs, Reason.OVERRIDE_ON, DRIFTED)
+    if odometry is None:
+        return land(settings, flight, inputs, Reason.OVERRIDE_ON, inputs.blindness)
+    if stands(settings, flight, odometry):
         return to(flight, Mode.INIT, Reason.OVERRIDE_ON, rearm=True)
-    if odometry is None or inputs.placeless:
-        return land(settings, flight, inputs, Reason.OVERRIDE_ON, DRIFTED if inputs.placeless else inputs.blindness)
     return to(flight, Mode.HOVER, Reason.OVERRIDE_ON, target=here(odometry), lock=True)
 
 

@@ -13,8 +13,9 @@ from e2efly.vehicles.gravity import GRAVITY
 
 PAUSE_S = 0.2
 """After a pause of the IMU longer than this, s, nothing is known any more."""
-TURNING, SHAKEN = 0.15, 0.6
-"""A vehicle that turns faster, rad/s, or whose specific force differs more from gravity, m/s^2, is carried."""
+TURNING, SHAKEN, SHAKEN_S = 0.15, 0.6, 0.15
+"""A vehicle that turns faster, rad/s, or whose specific force differs more from gravity, m/s^2, is carried. Both are
+smoothed over the third value, s: rotors that idle shake it."""
 FILTERED_S = 0.02
 """How much later the accelerometer tells than the gyroscope, s: flight controllers filter it more. Measured with
 Betaflight's filters in lockstep. A force belongs to the attitude of that time, and so the velocity is as late as it."""
@@ -54,6 +55,7 @@ class ImuSource:
         self._state: ErrorState | None = None
         self._last: tuple[float, np.ndarray, np.ndarray] | None = None
         self._rest: tuple[np.ndarray, np.ndarray] | None = None
+        self._shaking: tuple[np.ndarray, np.ndarray] | None = None
         self._rested = 0.0
         self._told = -math.inf
         self._turns: deque[tuple[float, np.ndarray]] = deque(maxlen=64)
@@ -65,17 +67,20 @@ class ImuSource:
         """See `AidedSource.feel`."""
         if not standing and self._state is not None:
             force = turned(-FILTERED_S * (gyroscope - self._state.gyro_bias)) @ force
-        last, self._last = self._last, (time, gyroscope, force)
+        last = self._last
         dt = math.inf if last is None else time - last[0]
+        if dt <= 0:
+            return
+        self._last = time, gyroscope, force
         if last is None or dt > PAUSE_S:
             self._state, self._rest = None, None
             self.problem = f"imu: the IMU was silent for {dt:.2f} s; accepted: at most {PAUSE_S:g} s"
             return
-        if dt <= 0:
-            return
         if standing:
             self._stand(time, gyroscope, force, dt)
-        elif self._state is not None:
+            return
+        self._rest = self._shaking = None
+        if self._state is not None:
             # two samples at the ends of the interval; the mean of what they say, in the axes at its end
             turn = turned(0.5 * (last[1] + gyroscope) * dt)
             state = self._state.moved(gyroscope, 0.5 * (force + turn.T @ last[2]), dt, AssumedNoise())
@@ -109,7 +114,10 @@ class ImuSource:
 
     def _stand(self, time: float, gyroscope: np.ndarray, force: np.ndarray, dt: float) -> None:
         """Average what the sensors say at rest. A vehicle that is carried is nowhere until it rests again."""
-        if np.linalg.norm(gyroscope) > TURNING or abs(np.linalg.norm(force) - GRAVITY) > SHAKEN:
+        share = 1.0 if self._shaking is None else -math.expm1(-dt / SHAKEN_S)
+        rate, weight = self._shaking or (gyroscope, force)
+        self._shaking = rate + share * (gyroscope - rate), weight + share * (force - weight)
+        if np.linalg.norm(self._shaking[0]) > TURNING or abs(np.linalg.norm(self._shaking[1]) - GRAVITY) > SHAKEN:
             self._state, self._rest = None, None
             self.problem = "imu: it is being moved; put it down"
             return
@@ -119,7 +127,7 @@ class ImuSource:
         bias, up = (old + share * (new - old) for old, new in zip(self._rest, (gyroscope, force), strict=True))
         self._rest, self._rested = (bias, up), self._rested + dt
         if self._rested < SETTLES_S:
-            self.problem = "imu: it has just been put down"
+            self._state, self.problem = None, "imu: it has just been put down"
             return
         size = float(np.linalg.norm(up))
         state = ErrorState.at(time, np.zeros(3), _level(up), AssumedNoise())
