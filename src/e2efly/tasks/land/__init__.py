@@ -73,11 +73,13 @@ class LandConfig(TaskConfig):
     }
     family: ClassVar = {"bptt": replace(robust["bptt"], steps=6_000_000, chunk=60)}
     lost_rotor: ClassVar = Robust(
-        weights={"progxy": 0.3, "descent": 1.0, "upright": 2.0, "anglevxy_sq": 0.02, "act2_sq": 0.02},
-        parameters={"descent_cone": 10.0, "vz_min": 1.0, "vz_max": 2.5},
-        algo={"horizon": 96, "learning_rate": 6e-3, "average": 0.99},
-        steps=4_000_000,
-        chunk=60,
+        weights={"progxy": 0.3, "descent": 1.0, "upright": 2.0, "anglevxy_sq": 0.02, "act2_sq": 0.02, "alive": 3.0},
+        parameters={"descent_cone": 10.0, "vz_min": 1.0, "vz_max": 2.0},
+        algo={"envs": 64, "horizon": 96, "learning_rate": 2e-3, "average": 0.99},
+        steps=16_000_000,
+        chunk=400,
+        recurrent=96,
+        hidden=(96, 96),
     )
     paper: ClassVar = Paper(
         weights={"progxy": 0.04, "vz": 0.1, "anglev": 0.001},
