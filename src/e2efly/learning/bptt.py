@@ -18,7 +18,7 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float
 
-from e2efly.config import BPTTConfig
+from e2efly.config import BPTTConfig, DAggerConfig
 from e2efly.config.algorithms import IMITATION_WINDOW
 from e2efly.environment import Env
 from e2efly.learning import dagger
@@ -35,9 +35,6 @@ from e2efly.learning.league import flown_by_opponents, founded, joined, opponent
 from e2efly.learning.networks import Weights
 from e2efly.learning.rollout import RolloutState, StepRecord, advance
 from e2efly.learning.teacher import Expert
-
-LED = 0.15
-"""Share of the imitation in which the expert flies, too: see `DAggerConfig.led`."""
 
 
 @jax.tree_util.register_dataclass
@@ -123,7 +120,7 @@ class BPTT(Algorithm):
     ) -> tuple[TrainState, dict[str, Array]]:
         """Steps that imitate the expert, each after a window of its own. `progress` is that of this part."""
         key, drawn = jax.random.split(state.key)
-        leads = dagger.leading(drawn, state.observation.shape[0], LED, progress)
+        leads = dagger.leading(drawn, state.observation.shape[0], DAggerConfig.led, progress)
         rate = config.imitation_rate * (config.learning_rate / config.imitation_rate) ** progress
         guide, old = Expert(), state.parameters
 

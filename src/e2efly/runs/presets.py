@@ -307,12 +307,11 @@ def gentle(config: TrainConfig) -> TrainConfig:
     if not hasattr(config.algo, "learning_rate_end"):
         return config
     algo: Any = config.algo
-    rates = {"learning_rate": algo.learning_rate_end}
-    imitated: float | None = getattr(algo, "imitated", None)
-    if imitated is None:
-        return dataclasses.replace(config, algo=dataclasses.replace(algo, **rates))
-    algo = dataclasses.replace(algo, imitated=None, **rates)
-    return dataclasses.replace(config, algo=algo, steps=round(config.steps * (1 - imitated)))
+    share = getattr(algo, "imitated", None) or 0.0
+    changes = {"learning_rate": algo.learning_rate_end} | ({"imitated": None} if share else {})
+    return dataclasses.replace(
+        config, algo=dataclasses.replace(algo, **changes), steps=round(config.steps * (1 - share))
+    )
 
 
 def check(config: TrainConfig) -> None:

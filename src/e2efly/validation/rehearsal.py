@@ -205,8 +205,7 @@ class Spectator:
 
 
 def _truth(rig: FlightBench) -> Odometry:
-    state = RigidState.of(rig.state)
-    return Odometry(rig.now(), state.position, state.velocity, state.quaternion, state.body_rate)
+    return RigidState.of(rig.state).odometry(rig.now())
 
 
 def parked(world: World, course: Course, seed: int) -> FlownBody:

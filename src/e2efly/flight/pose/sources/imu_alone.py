@@ -7,15 +7,14 @@ from collections import deque
 import numpy as np
 
 from e2efly.flight.pose.gates.error_state import AssumedNoise, ErrorState, quaternion_of, rotation_of, turned
+from e2efly.flight.pose.gates.gate_source import PAUSE_S, SHAKEN, TURNING
 from e2efly.flight.pose.registry import MalformedError, register
 from e2efly.policy.odometry import Sample
 from e2efly.vehicles.gravity import GRAVITY
 
-PAUSE_S = 0.2
-"""After a pause of the IMU longer than this, s, nothing is known any more."""
-TURNING, SHAKEN, SHAKEN_S = 0.15, 0.6, 0.15
-"""A vehicle that turns faster, rad/s, or whose specific force differs more from gravity, m/s^2, is carried. Both are
-smoothed over the third value, s: rotors that idle shake it."""
+SHAKEN_S = 0.15
+"""The sensors of a vehicle that stands are smoothed over this time, s, before they tell that it is carried: rotors that
+idle shake it."""
 FILTERED_S = 0.02
 """How much later the accelerometer tells than the gyroscope, s: flight controllers filter it more. Measured with
 Betaflight's filters in lockstep. A force belongs to the attitude of that time, and so the velocity is as late as it."""
@@ -68,11 +67,14 @@ class ImuSource:
         if not standing and self._state is not None:
             force = turned(-FILTERED_S * (gyroscope - self._state.gyro_bias)) @ force
         last = self._last
-        dt = math.inf if last is None else time - last[0]
+        if last is None:
+            self._last = time, gyroscope, force
+            return
+        dt = time - last[0]
         if dt <= 0:
             return
         self._last = time, gyroscope, force
-        if last is None or dt > PAUSE_S:
+        if dt > PAUSE_S:
             self._state, self._rest = None, None
             self.problem = f"imu: the IMU was silent for {dt:.2f} s; accepted: at most {PAUSE_S:g} s"
             return
